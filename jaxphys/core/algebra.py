@@ -1,7 +1,9 @@
 """Dense 3x3 algebra written out element by element.
 
-Every function takes arrays whose first one or two axes are the matrix or vector and whose other axes are anything: `(3, 3)` for one
-particle, `(3, 3, N)` for all of them. With the particle axis last, XLA vectorises each line over particles; a batched `dot_general` of
+Every function takes arrays whose first one or two axes are the matrix or vector and whose other
+axes are anything: `(3, 3)` for one
+particle, `(3, 3, N)` for all of them. With the particle axis last, XLA vectorises each line over
+particles; a batched `dot_general` of
 3x3 matrices does not, and is what jaxlib 0.10.2 computes wrongly.
 """
 
@@ -33,14 +35,20 @@ def trace(A: Array) -> Array:
 def matmul(A: Array, B: Array) -> Array:
     """A @ B for (3, 3, ...) arrays."""
     return stack_matrix(
-        [[A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j] for j in range(3)] for i in range(3)]
+        [
+            [A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j] for j in range(3)]
+            for i in range(3)
+        ]
     )
 
 
 def matmul_transpose(A: Array, B: Array) -> Array:
     """A @ B^T for (3, 3, ...) arrays."""
     return stack_matrix(
-        [[A[i, 0] * B[j, 0] + A[i, 1] * B[j, 1] + A[i, 2] * B[j, 2] for j in range(3)] for i in range(3)]
+        [
+            [A[i, 0] * B[j, 0] + A[i, 1] * B[j, 1] + A[i, 2] * B[j, 2] for j in range(3)]
+            for i in range(3)
+        ]
     )
 
 

@@ -12,7 +12,9 @@ class InputError(ValueError):
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """A tail for an error about an unknown `name`: the closest of the valid `names`, then all of them."""
+    """A tail for an error about an unknown `name`: the closest of the valid `names`, then all of
+    them.
+    """
     names = sorted(names)
     close = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(repr(c) for c in close)}? " if close else ""

@@ -9,7 +9,8 @@ from pathlib import Path
 
 @contextmanager
 def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
-    """Yields a path beside `path` to write to; renames it into place on success, removes it on failure.
+    """Yields a path beside `path` to write to; renames it into place on success, removes it on
+    failure.
 
     The extension is kept, since writers of images and video choose a format by it.
     """

@@ -5,7 +5,9 @@ from jax import Array
 
 
 def normalise_quaternion(quaternions: Array) -> Array:
-    """Unit quaternions of shape (..., 4); a zero quaternion becomes the identity, with zero gradient."""
+    """Unit quaternions of shape (..., 4); a zero quaternion becomes the identity, with zero
+    gradient.
+    """
     squared = jnp.sum(quaternions**2, axis=-1, keepdims=True)
     usable = squared > 1e-24
     length = jnp.sqrt(jnp.where(usable, squared, 1.0))
@@ -27,12 +29,21 @@ def quaternion_to_matrix(quaternions: Array) -> Array:
 def matrix_to_quaternion(matrices: Array) -> Array:
     """Unit quaternions (..., 4) with w >= 0 of rotation matrices (..., 3, 3).
 
-    Of the four candidate formulas (Shepperd 1978) the one with the largest divisor is taken, so none divides by a small number.
+    Of the four candidate formulas (Shepperd 1978) the one with the largest divisor is taken, so
+    none divides by a small number.
     """
     m = matrices
     xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
-    yz, zx, xy = m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
-    sxy, szx, syz = m[..., 1, 0] + m[..., 0, 1], m[..., 0, 2] + m[..., 2, 0], m[..., 2, 1] + m[..., 1, 2]
+    yz, zx, xy = (
+        m[..., 2, 1] - m[..., 1, 2],
+        m[..., 0, 2] - m[..., 2, 0],
+        m[..., 1, 0] - m[..., 0, 1],
+    )
+    sxy, szx, syz = (
+        m[..., 1, 0] + m[..., 0, 1],
+        m[..., 0, 2] + m[..., 2, 0],
+        m[..., 2, 1] + m[..., 1, 2],
+    )
     candidates = jnp.stack(
         [
             jnp.stack([1 + xx + yy + zz, yz, zx, xy], -1),
@@ -49,7 +60,9 @@ def matrix_to_quaternion(matrices: Array) -> Array:
 
 
 def axis_angle_to_matrix(axis: Array, angle: Array) -> Array:
-    """Rotation by `angle` [rad] about `axis` (3,), which need not have unit length. Shape (3, 3). Rodrigues' formula."""
+    """Rotation by `angle` [rad] about `axis` (3,), which need not have unit length. Shape (3, 3).
+    Rodrigues' formula.
+    """
     x, y, z = axis / jnp.linalg.norm(axis)
     zero = jnp.zeros_like(x)
     K = jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])

@@ -1,0 +1,4 @@
+"""Benchmarks: problems, methods and peers, one JSON line a run.
+
+python -m benchmarks run all --quick --out outputs/bench.jsonl
+"""

@@ -1,0 +1,64 @@
+"""Runs one case in this process and prints its measurements as the last line of standard output."""
+
+import importlib
+import json
+import platform
+import resource
+import statistics
+import time
+from importlib import metadata
+
+SUITES = ("mpm", "mpm-grad", "render", "headline", "order")
+MINIMUM_CALLS = 3
+
+
+def suite_cases(suite: str, quick: bool) -> list:
+    """The cases of a suite: `cases(quick)` of the module that bears its name."""
+    return importlib.import_module(f"benchmarks.{suite.replace('-', '_')}").cases(quick)
+
+
+def versions() -> dict[str, str]:
+    """Versions of what is measured and of what it stands on."""
+    found = {"python": platform.python_version()}
+    for name in ("jaxphys-splats", "jax", "jaxlib", "numpy", "taichi"):
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def measure(suite: str, name: str, method: str, quick: bool) -> dict:
+    """Prepares the case, calls it for a second or two after one warm-up call, and describes what
+    was seen.
+    """
+    (case,) = [c for c in suite_cases(suite, quick) if (c.name, c.method) == (name, method)]
+    prepared = case.prepare()
+    prepared.call()
+    samples: list[float] = []
+    budget = 0.5 if quick else 2.0
+    while len(samples) < MINIMUM_CALLS or (sum(samples) < budget and len(samples) < 200):
+        start = time.perf_counter()
+        prepared.call()
+        samples.append(time.perf_counter() - start)
+    return {
+        "suite": suite,
+        "case": name,
+        "method": method,
+        **case.size,
+        "dtype": case.dtype,
+        "seconds": statistics.median(samples),
+        "samples": samples,
+        "work": prepared.work,
+        "compile_seconds": prepared.compile_seconds,
+        "peak_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024,
+        "error": prepared.error() if prepared.error else None,
+        "status": "ok",
+        "versions": versions(),
+        **prepared.extra,
+    }
+
+
+def main(suite: str, name: str, method: str, quick: bool) -> None:
+    """Measures one case and prints one JSON line."""
+    print(json.dumps(measure(suite, name, method, quick)), flush=True)
