@@ -1,0 +1,71 @@
+"""The harness's arithmetic: medians over processes, ratios round by round, failures kept."""
+
+import json
+
+import pytest
+
+from benchmarks import worker
+from benchmarks.case import Case, Prepared
+from benchmarks.harness import merge_rounds, peer_ratios
+
+IDENTITY = {"suite": "s", "case": "c", "method": "jaxphys"}
+
+
+def round_of(seconds: float, method: str = "jaxphys", work: float = 10.0) -> dict:
+    return {
+        "suite": "s",
+        "case": "c",
+        "method": method,
+        "status": "ok",
+        "seconds": seconds,
+        "samples": [seconds] * 3,
+        "work": work,
+        "peak_bytes": 1,
+        "error": None,
+        "compile_seconds": None,
+    }
+
+
+def test_median_over_processes_not_over_samples():
+    line = merge_rounds(IDENTITY, [round_of(1.0), round_of(9.0), round_of(2.0)])
+    assert line["seconds"] == 2.0
+    assert (line["seconds_low"], line["seconds_high"]) == (1.0, 9.0)
+    assert len(line["samples"]) == 3
+
+
+def test_a_failed_round_is_reported_not_dropped():
+    line = merge_rounds(IDENTITY, [round_of(1.0), {"status": "exit 1: boom"}])
+    assert "1 of 2 rounds failed" in line["status"] and "boom" in line["status"]
+    assert merge_rounds(IDENTITY, [{"status": "timeout"}])["status"] == "timeout"
+
+
+def test_ratio_is_work_per_second_of_ours_over_theirs():
+    ours = merge_rounds(IDENTITY, [round_of(1.0, work=30.0), round_of(2.0, work=30.0)])
+    theirs = merge_rounds(
+        IDENTITY | {"method": "taichi"}, [round_of(1.0, "taichi"), round_of(2.0, "taichi")]
+    )
+    (ratio,) = peer_ratios([ours, theirs])
+    assert ratio["peer"] == "taichi" and ratio["ratio"] == pytest.approx(3.0)
+    assert list(peer_ratios([theirs])) == []
+
+
+def test_our_own_variants_are_not_peers():
+    ours = merge_rounds(IDENTITY, [round_of(1.0)])
+    variant = merge_rounds(IDENTITY | {"method": "jaxphys-scatter"}, [round_of(1.0)])
+    assert list(peer_ratios([ours, variant])) == []
+
+
+def test_worker_measures_and_prints_one_json_line(monkeypatch, capsys):
+    calls = []
+    case = Case(
+        "tiny",
+        "jaxphys",
+        lambda: Prepared(lambda: calls.append(1), work=4.0, error=lambda: 0.25),
+        {"particles": 2},
+    )
+    monkeypatch.setattr(worker, "suite_cases", lambda suite, quick: [case])
+    worker.main("mpm", "tiny", "jaxphys", quick=True)
+    line = json.loads(capsys.readouterr().out)
+    assert line["particles"] == 2 and line["work"] == 4.0 and line["error"] == 0.25
+    assert len(line["samples"]) == len(calls) - 1 >= worker.MINIMUM_CALLS
+    assert line["versions"]["jax"]
