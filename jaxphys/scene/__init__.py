@@ -1,1 +1,28 @@
+"""What a user asks for: scenes as frozen dataclasses, their JSON, PhysGaussian's configs, and
+the plan.
+"""
 
+from .boundaries import Box as Box
+from .boundaries import Impulse as Impulse
+from .boundaries import Plane as Plane
+from .boundaries import Release as Release
+from .boundaries import Rotate as Rotate
+from .boundaries import Translate as Translate
+from .boundaries import Walls as Walls
+from .json import read_json as read_json
+from .json import scene_from_json as scene_from_json
+from .json import to_json as to_json
+from .json import write_scene as write_scene
+from .physgaussian import Imported as Imported
+from .physgaussian import from_physgaussian as from_physgaussian
+from .physgaussian import is_physgaussian as is_physgaussian
+from .read import read_scene as read_scene
+from .scene import Domain as Domain
+from .scene import Filling as Filling
+from .scene import Generation as Generation
+from .scene import Ground as Ground
+from .scene import Object as Object
+from .scene import Region as Region
+from .scene import Rotation as Rotation
+from .scene import Scene as Scene
+from .scene import View as View

@@ -1,0 +1,149 @@
+"""The boundary conditions of PhysGaussian's configuration format as ours."""
+
+from typing import Any
+
+from jaxphys.core.errors import InputError, nearest
+from jaxphys.scene.boundaries import (
+    FOREVER,
+    Boundary,
+    Box,
+    Impulse,
+    Plane,
+    Release,
+    Rotate,
+    Translate,
+    Walls,
+)
+from jaxphys.scene.reader import Reader
+
+SPAN = {"start_time", "end_time"}
+KEYS = {
+    "bounding_box": set(),
+    "cuboid": {"point", "size", "velocity", "reset"} | SPAN,
+    "particle_impulse": {"force", "start_time", "num_dt", "point", "size"},
+    "enforce_particle_translation": {"point", "size", "velocity"} | SPAN,
+    "surface_collider": {"point", "normal", "surface", "friction"} | SPAN,
+    "release_particles_sequentially": {"normal", "start_position", "end_position", "num_layers"}
+    | SPAN,
+    "enforce_particle_velocity_rotation": (
+        {"normal", "point", "half_height_and_radius", "rotation_scale", "translation_scale"} | SPAN
+    ),
+}
+
+
+def _cuboid(read: Reader, substep: float, notes: list[str]) -> Box:
+    if read.flag("reset"):
+        notes.append(
+            "cuboid reset: theirs stops the whole grid outside its time span; only the box acts"
+        )
+    return Box(
+        read.numbers("point", 3),
+        read.numbers("size", 3),
+        read.numbers("velocity", 3),
+        read.number("start_time", 0.0),
+        read.number("end_time", 1e3),
+    )
+
+
+def _impulse(read: Reader, substep: float, notes: list[str]) -> Impulse:
+    notes.append(
+        "particle_impulse: the force acts on every particle, so its effect depends on their masses"
+    )
+    return Impulse(
+        read.numbers("point", 3, [1, 1, 1]),
+        read.numbers("size", 3, [1, 1, 1]),
+        read.numbers("force", 3),
+        read.number("start_time", 0.0),
+        read.whole("num_dt", 1) * substep,
+    )
+
+
+def _translate(read: Reader, substep: float, notes: list[str]) -> Translate:
+    return Translate(
+        read.numbers("point", 3),
+        read.numbers("size", 3),
+        read.numbers("velocity", 3),
+        read.number("start_time"),
+        read.number("end_time"),
+    )
+
+
+def _plane(read: Reader, substep: float, notes: list[str]) -> Plane:
+    surface, friction = read.text("surface", "sticky"), read.number("friction", 0.0)
+    if surface == "sticky" and friction != 0:
+        raise InputError(
+            f"{read.where}.friction: a sticky surface takes friction 0, found {friction}"
+        )
+    if surface == "cut":
+        notes.append(
+            "surface_collider cut: theirs is a fixed layer 0.4 < z < 0.53; a separating plane here"
+        )
+    elif surface != "sticky":
+        notes.append(
+            f"surface_collider {surface}: theirs sticks whatever it says; it is {surface} here"
+        )
+    kind = surface if surface in ("sticky", "slip") else "separate"
+    return Plane(
+        read.numbers("point", 3),
+        read.numbers("normal", 3),
+        kind,
+        friction,
+        read.number("start_time", 0.0),
+        read.number("end_time", FOREVER),
+    )
+
+
+def _release(read: Reader, substep: float, notes: list[str]) -> Release:
+    notes.append("release_particles_sequentially: theirs has 50 layers whatever num_layers says")
+    return Release(
+        read.numbers("normal", 3),
+        read.number("start_position"),
+        read.number("end_position"),
+        read.whole("num_layers", 50),
+        read.number("start_time"),
+        read.number("end_time"),
+    )
+
+
+def _rotate(read: Reader, substep: float, notes: list[str]) -> Rotate:
+    half_height, radius = read.numbers("half_height_and_radius", 2)
+    return Rotate(
+        read.numbers("point", 3),
+        read.numbers("normal", 3),
+        half_height,
+        radius,
+        read.number("rotation_scale"),
+        read.number("translation_scale"),
+        read.number("start_time"),
+        read.number("end_time"),
+    )
+
+
+def _walls(read: Reader, substep: float, notes: list[str]) -> Walls:
+    return Walls()
+
+
+READERS = {
+    "bounding_box": _walls,
+    "cuboid": _cuboid,
+    "particle_impulse": _impulse,
+    "enforce_particle_translation": _translate,
+    "surface_collider": _plane,
+    "release_particles_sequentially": _release,
+    "enforce_particle_velocity_rotation": _rotate,
+}
+
+
+def read_boundary(value: Any, where: str, substep: float, notes: list[str]) -> Boundary:
+    """One entry of `boundary_conditions`; adds to `notes` what differs from PhysGaussian."""
+    if not isinstance(value, dict) or not isinstance(value.get("type"), str):
+        raise InputError(f"{where}: expected an object with a key 'type'; valid: {', '.join(KEYS)}")
+    name = value["type"]
+    if name not in KEYS:
+        raise InputError(f"{where}.type: unknown boundary {name!r}; {nearest(name, KEYS)}")
+    read = Reader(value, KEYS[name] | {"type"}, where)
+    try:
+        return READERS[name](read, substep, notes)
+    except InputError as error:
+        message = str(error)
+        raise InputError(message if message.startswith(where) else f"{where}.{message}") from None

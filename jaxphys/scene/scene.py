@@ -1,0 +1,251 @@
+"""What a user asks for, as frozen dataclasses that read from and write to JSON (`json.py`).
+
+World coordinates are the solver's: right-handed, z up, the domain is [0, size]. SI units; angles
+in degrees.
+"""
+
+from dataclasses import dataclass, field
+
+from jaxphys.core.errors import InputError
+from jaxphys.scene.boundaries import Boundary, Vector
+from jaxphys.scene.check import NON_NEGATIVE, POSITIVE, between, check_ranges
+
+Area = tuple[float, float, float, float, float, float]
+
+
+class _Checked:
+    def __post_init__(self):
+        check_ranges(self)
+
+
+@dataclass(frozen=True)
+class Rotation(_Checked):
+    """A turn about an axis.
+
+    Attributes:
+        axis: of any length but zero.
+        degrees: right-handed.
+    """
+
+    axis: Vector
+    degrees: float
+
+
+@dataclass(frozen=True)
+class Region(_Checked):
+    """A box of an object, at rest, with material parameters of its own.
+
+    Attributes:
+        centre, half_size: in the domain, at time 0 [m].
+        parameters: by name, as `jaxphys materials` lists them.
+    """
+
+    centre: Vector
+    half_size: Vector = field(metadata=POSITIVE)
+    parameters: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Filling(_Checked):
+    """Particles inside a hollow object. A field left `null` follows from the grid.
+
+    Attributes:
+        spacing: of the cells that are searched [m]; null: half the grid's spacing.
+        density_threshold: summed opacity above which a cell counts as solid.
+        search_threshold: how many of the six directions must meet solid cells for a cell to be
+            inside.
+        search_exclude_direction, ray_direction: 0 to 5 for +x, -x, +y, -y, +z, -z; -1 for none.
+        per_cell: particles for every cell inside.
+        maximum: largest number of particles to add.
+        area: (x0, x1, y0, y1, z0, z1) in the domain [m]; null: everywhere.
+        smooth: smooth the density field first.
+        relax: spread the new particles evenly (blue noise).
+    """
+
+    spacing: float | None = field(default=None, metadata=POSITIVE)
+    density_threshold: float = field(default=0.5, metadata=NON_NEGATIVE)
+    search_threshold: int = field(default=5, metadata=between(0, 6))
+    search_exclude_direction: int = field(default=-1, metadata=between(-1, 5))
+    ray_direction: int = field(default=-1, metadata=between(-1, 5))
+    per_cell: int = field(default=1, metadata=POSITIVE)
+    maximum: int = field(default=200_000, metadata=POSITIVE)
+    area: Area | None = None
+    smooth: bool = False
+    relax: bool = True
+
+
+@dataclass(frozen=True)
+class Object(_Checked):
+    """One thing in the scene.
+
+    Attributes:
+        source: path of a .ply, a mesh or a directory of `generate`; null: the one named on the
+            command line.
+        material: a name that `jaxphys materials` lists.
+        parameters: what differs from the material's defaults, by name.
+        regions: boxes with other parameters; later ones win.
+        size: longest side after rotation [m].
+        centre: of the bounding box, in the domain [m].
+        rotation: turns in the order given, about the object's centre.
+        velocity: at the start [m/s].
+        spin: at the start, about the centre [rad/s].
+        opacity_threshold: Gaussians below it take no part and are not drawn.
+        area: (x0, x1, y0, y1, z0, z1) in the rotated source's own units: only what is inside
+            moves; null: all.
+        filling: null leaves the object hollow.
+        splats: number of Gaussians made where the source is a mesh.
+    """
+
+    source: str | None = None
+    material: str = "jelly"
+    parameters: dict[str, float] = field(default_factory=dict)
+    regions: tuple[Region, ...] = ()
+    size: float = field(default=1.0, metadata=POSITIVE)
+    centre: Vector = (1.25, 1.25, 1.0)
+    rotation: tuple[Rotation, ...] = ()
+    velocity: Vector = (0.0, 0.0, 0.0)
+    spin: Vector = (0.0, 0.0, 0.0)
+    opacity_threshold: float = field(default=0.02, metadata=between(0, 1))
+    area: Area | None = None
+    filling: Filling | None = field(default_factory=Filling)
+    splats: int = field(default=20_000, metadata=POSITIVE)
+
+
+@dataclass(frozen=True)
+class Domain(_Checked):
+    """The box that is simulated.
+
+    Attributes:
+        size: of its sides [m].
+        spacing: of the grid [m].
+    """
+
+    size: Vector = field(default=(2.5, 2.5, 2.0), metadata=POSITIVE)
+    spacing: float = field(default=1 / 32, metadata=POSITIVE)
+
+    def __post_init__(self):
+        super().__post_init__()
+        if min(self.shape) < 8:
+            raise InputError(
+                f"size: {self.size} holds fewer than 8 nodes a side at spacing {self.spacing}; "
+                "make the domain larger or the spacing finer"
+            )
+        if self.shape[0] * self.shape[1] * self.shape[2] > 512**3:
+            raise InputError(
+                f"spacing: {self.spacing} makes a grid of {'x'.join(map(str, self.shape))} nodes, "
+                "more than 512x512x512; make it coarser"
+            )
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Number of grid nodes along each axis."""
+        x, y, z = (round(side / self.spacing) + 1 for side in self.size)
+        return x, y, z
+
+
+@dataclass(frozen=True)
+class View(_Checked):
+    """The camera: it looks at `target` from `distance`, and may move.
+
+    Attributes:
+        azimuth: degrees about z, 0 looks from +x, 90 from +y.
+        elevation: degrees above the horizon.
+        distance: to the target [m]; null: so that the whole motion is in the picture.
+        target: [m]; null: the middle of the motion.
+        field_of_view: vertical, degrees.
+        turn, rise: change of azimuth and elevation [degrees/s].
+        approach: change of distance [m/s].
+    """
+
+    azimuth: float = -60.0
+    elevation: float = field(default=14.0, metadata=between(-89.9, 89.9))
+    distance: float | None = field(default=None, metadata=POSITIVE)
+    target: Vector | None = None
+    field_of_view: float = field(default=35.0, metadata=between(1.0, 150.0))
+    turn: float = 0.0
+    rise: float = 0.0
+    approach: float = 0.0
+
+
+@dataclass(frozen=True)
+class Ground(_Checked):
+    """The floor that is drawn (physics has its own, in `boundaries`).
+
+    Attributes:
+        height: [m].
+        colour: red, green, blue in [0, 1].
+        shadow: darkness of the soft shadow under what is near the floor, in [0, 1].
+    """
+
+    height: float = 0.1
+    colour: Vector = field(default=(0.86, 0.86, 0.85), metadata=between(0, 1))
+    shadow: float = field(default=0.45, metadata=between(0, 1))
+
+
+@dataclass(frozen=True)
+class Generation(_Checked):
+    """How the object of a scene came from a sentence.
+
+    Attributes:
+        prompt: the sentence.
+        steps: of optimisation; null: the default of `generate`.
+        splats: number of Gaussians at most; null: the default of `generate`.
+    """
+
+    prompt: str
+    steps: int | None = field(default=None, metadata=NON_NEGATIVE)
+    splats: int | None = field(default=None, metadata=POSITIVE)
+
+
+@dataclass(frozen=True)
+class Scene(_Checked):
+    """Everything that decides a run: the same scene and objects give the same bytes.
+
+    Attributes:
+        objects: at least one.
+        gravity: [m/s^2].
+        boundaries: in the order in which they act.
+        domain: the simulated box and its grid.
+        damping: the grid's velocity decays at this rate [1/s].
+        frames: pictures of the video, the first one at rest.
+        fps: pictures a second of the video.
+        frame_time: simulated time between pictures [s]; null: 1 / fps, real time.
+        substep: time step [s]; null: as large as the bounds allow.
+        unsafe_substep: take `substep` even beyond the bounds.
+        camera: where from.
+        width, height: of the pictures [pixels].
+        background: red, green, blue in [0, 1].
+        ground: null draws none.
+        regularise_colours: normalise and clamp colours, with one range for each object.
+        seed: of every random choice.
+        generation: where the first object comes from, if from a sentence.
+    """
+
+    objects: tuple[Object, ...] = (Object(),)
+    gravity: Vector = (0.0, 0.0, -9.81)
+    boundaries: tuple[Boundary, ...] = ()
+    domain: Domain = Domain()
+    damping: float = field(default=0.0, metadata=NON_NEGATIVE)
+    frames: int = field(default=48, metadata=between(1, 100_000))
+    fps: float = field(default=24.0, metadata=between(0.1, 1000.0))
+    frame_time: float | None = field(default=None, metadata=POSITIVE)
+    substep: float | None = field(default=None, metadata=POSITIVE)
+    unsafe_substep: bool = False
+    camera: View = View()
+    width: int = field(default=1958, metadata=between(8, 8192))
+    height: int = field(default=1090, metadata=between(8, 8192))
+    background: Vector = field(default=(1.0, 1.0, 1.0), metadata=between(0, 1))
+    ground: Ground | None = None
+    regularise_colours: bool = True
+    seed: int = field(default=0, metadata=between(0, 2**31 - 1))
+    generation: Generation | None = None
+
+    def __post_init__(self):
+        super().__post_init__()
+        if not self.objects:
+            raise InputError("objects: a scene needs at least one object")
+
+    @property
+    def seconds_per_frame(self) -> float:
+        """Simulated time between two pictures [s]."""
+        return 1 / self.fps if self.frame_time is None else self.frame_time

@@ -1,0 +1,154 @@
+import json
+import math
+
+import pytest
+
+from jaxphys.core.errors import InputError
+from jaxphys.scene import Box, Impulse, Plane, Release, Rotate, Translate, Walls, read_scene
+from jaxphys.scene.physgaussian import from_physgaussian
+
+FICUS = {
+    "opacity_threshold": 0.02,
+    "rotation_degree": [90.0, 10.0],
+    "rotation_axis": [0, 2],
+    "substep_dt": 1e-4,
+    "frame_dt": 4e-2,
+    "frame_num": 125,
+    "nu": 0.4,
+    "E": 2e6,
+    "material": "jelly",
+    "density": 200,
+    "g": [0.0, 0.0, 0.0],
+    "grid_v_damping_scale": 0.9999,
+    "rpic_damping": 0.0,
+    "additional_material_params": [
+        {"point": [1, 1, 1.5], "size": [0.5, 0.5, 0.5], "E": 1e6, "nu": 0.4, "density": 70}
+    ],
+    "boundary_conditions": [
+        {"type": "cuboid", "point": [1, 1, 0.5], "size": [0.5, 0.5, 0.28], "velocity": [0, 0, 0],
+         "start_time": 0, "end_time": 1e3, "reset": 1},
+        {"type": "particle_impulse", "force": [-0.18, 0, 0], "num_dt": 1},
+    ],
+    "mpm_space_viewpoint_center": [1.0, 1.0, 1.0],
+    "mpm_space_vertical_upward_axis": [0, 0, 1],
+    "default_camera_index": -1,
+    "show_hint": False,
+    "init_azimuthm": 10.0,
+    "init_elevation": 5.0,
+    "init_radius": 4.0,
+    "move_camera": True,
+    "delta_a": 0.5,
+    "delta_e": 0.0,
+    "delta_r": 0.0,
+    "particle_filling": {
+        "n_grid": 128, "density_threshold": 5.0, "search_threshold": 0.5,
+        "max_partciels_per_cell": 4, "boundary": [0, 2, 0, 2, 0, 1],
+    },
+}  # fmt: skip
+
+SPAN = {"start_time": 0.0, "end_time": 2.0}
+ALL = [
+    ({"type": "bounding_box"}, Walls),
+    ({"type": "cuboid", "point": [1, 1, 1], "size": [1, 1, 1], "velocity": [0, 0, 1]}, Box),
+    ({"type": "particle_impulse", "force": [0, 0, 1]}, Impulse),
+    (
+        {"type": "enforce_particle_translation", "point": [1, 1, 1], "size": [1, 1, 1],
+         "velocity": [0, 0, 1]} | SPAN,
+        Translate,
+    ),
+    (
+        {"type": "surface_collider", "point": [1, 1, 0], "normal": [0, 0, 1], "surface": "slip",
+         "friction": 0.1} | SPAN,
+        Plane,
+    ),
+    (
+        {"type": "release_particles_sequentially", "normal": [1, 0, 0], "start_position": 1.5,
+         "end_position": 0.5, "num_layers": 20} | SPAN,
+        Release,
+    ),
+    (
+        {"type": "enforce_particle_velocity_rotation", "normal": [1, 0, 0], "point": [1, 1, 1],
+         "half_height_and_radius": [0.1, 0.6], "rotation_scale": 1.9, "translation_scale": 0.0}
+        | SPAN,
+        Rotate,
+    ),
+]  # fmt: skip
+
+
+def test_ficus_loads_with_its_meaning_and_notes():
+    scene, notes = (loaded := from_physgaussian(FICUS)).scene, loaded.notes
+    thing = scene.objects[0]
+    assert scene.domain.spacing == pytest.approx(2 / 50)
+    assert thing.parameters == {"youngs_modulus": 2e6, "poisson_ratio": 0.4, "density": 200.0}
+    assert thing.regions[0].parameters["density"] == 70
+    assert [turn.axis for turn in thing.rotation] == [(1, 0, 0), (0, 0, 1)]
+    assert thing.filling.spacing == pytest.approx(2 / 128) and thing.filling.per_cell == 4
+    assert thing.filling.search_threshold == 1
+    assert (scene.frames, scene.fps, scene.frame_time) == (125, 25, 0.04)
+    # One substep's factor applied for a second.
+    assert scene.damping == pytest.approx(-math.log(0.9999) / 1e-4)
+    assert scene.camera.azimuth == 55 and scene.camera.turn == pytest.approx(0.5 / 0.04)
+    assert scene.boundaries[1].duration == pytest.approx(1e-4)
+    text = "\n".join(notes)
+    for word in ("cuboid reset", "particle_impulse", "particle_filling", "init_radius", "bounds"):
+        assert word in text
+
+
+@pytest.mark.parametrize(("condition", "kind"), ALL)
+def test_every_boundary_type(condition, kind):
+    loaded = from_physgaussian({"g": [0, 0, -9.8], "boundary_conditions": [condition]})
+    assert isinstance(loaded.scene.boundaries[0], kind)
+
+
+def test_surface_and_layers_are_honoured_not_copied():
+    slip = from_physgaussian({"g": [0, 0, 0], "boundary_conditions": [ALL[4][0]]})
+    assert slip.scene.boundaries[0].surface == "slip"
+    assert any("sticks whatever" in note for note in slip.notes)
+    release = from_physgaussian({"g": [0, 0, 0], "boundary_conditions": [ALL[5][0]]})
+    assert release.scene.boundaries[0].layers == 20
+    assert any("50 layers" in note for note in release.notes)
+
+
+@pytest.mark.parametrize(
+    ("material", "ours"), [("jelly", "jelly"), ("metal", "metal"), ("sand", "sand"),
+                           ("foam", "metal"), ("plasticine", "metal"), ("snow", "sand")]
+)  # fmt: skip
+def test_materials(material, ours):
+    loaded = from_physgaussian({"material": material, "g": [0, 0, 0], "yield_stress": 1e4})
+    assert loaded.scene.objects[0].material == ours
+    assert (material == ours) != any(note.startswith("material:") for note in loaded.notes)
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ({"materiel": "jelly"}, ["'materiel'", "'material'"]),
+        ({"material": "jello"}, ["config.material", "'jelly'"]),
+        ({"E": "stiff"}, ["config.E", "number"]),
+        ({"g": 9.8}, ["config.g", "3 numbers"]),
+        ({"rotation_degree": [1], "rotation_axis": []}, ["rotation_axis", "1 angles"]),
+        ({"rotation_degree": [1], "rotation_axis": [3]}, ["rotation_axis"]),
+        (
+            {"boundary_conditions": [{"type": "cubiod"}]},
+            ["boundary_conditions[0].type", "'cuboid'"],
+        ),
+        ({"boundary_conditions": [{"type": "cuboid"}]}, ["boundary_conditions[0].point"]),
+        ({"frame_num": 0}, ["frames"]),
+        ({"substep_dt": 1.0}, ["substep_dt"]),
+        ({"n_grid": 0}, ["n_grid"]),
+        ({"grid_v_damping_scale": 0}, ["grid_v_damping_scale"]),
+    ],
+)
+def test_wrong_values_name_the_field(value, words):
+    with pytest.raises(InputError) as error:
+        from_physgaussian({"g": [0, 0, 0], "frame_dt": 0.04} | value)
+    message = str(error.value)
+    assert message.startswith("config") and "\n" not in message
+    for word in words:
+        assert word in message
+
+
+def test_file_is_recognised(tmp_path):
+    (tmp_path / "ficus.json").write_text(json.dumps(FICUS))
+    loaded = read_scene(tmp_path / "ficus.json")
+    assert loaded.notes and loaded.scene.frames == 125
