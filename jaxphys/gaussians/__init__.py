@@ -1,1 +1,18 @@
+"""3D Gaussians: the pytree, harmonics, files, meshes, density control, filling and colour."""
 
+from .gaussians import Gaussians as Gaussians
+from .gaussians import concatenate as concatenate
+from .gaussians import covariances as covariances
+from .gaussians import from_points as from_points
+from .gaussians import opacities as opacities
+from .gaussians import opacity_to_logit as opacity_to_logit
+from .gaussians import require_finite as require_finite
+from .gaussians import scales as scales
+from .gaussians import select as select
+from .gaussians import to_splats as to_splats
+from .gaussians import transform as transform
+from .gaussians import view_colours as view_colours
+from .gaussians import with_degree as with_degree
+from .ply import read_ply as read_ply
+from .ply import write_ply as write_ply
+from .splat_file import write_splat as write_splat
