@@ -72,7 +72,6 @@ def _parameters(read: Reader, material: str, notes: list[str]) -> dict[str, floa
         notes.append(
             "metal: their stress carries an extra factor of the stretch; here it is Kirchhoff's"
         )
-        notes.append("yield_stress: theirs bounds |dev tau|; here it is the uniaxial yield stress")
         if read.number("hardening", 0.0) == 1:
             parameters["hardening"] = read.number("xi", 0.0)
             notes.append("hardening: xi is taken as the hardening modulus [Pa]")

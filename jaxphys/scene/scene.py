@@ -152,7 +152,7 @@ class View(_Checked):
         elevation: degrees above the horizon.
         distance: to the target [m]; null: so that the whole motion is in the picture.
         target: [m]; null: the middle of the motion.
-        field_of_view: vertical, degrees.
+        field_of_view: horizontal, degrees.
         turn, rise: change of azimuth and elevation [degrees/s].
         approach: change of distance [m/s].
     """

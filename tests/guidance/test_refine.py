@@ -20,7 +20,7 @@ def test_short_prompts_are_elaborated():
 def test_long_prompts_are_reduced_and_keep_their_object():
     prompt = (
         "I would really like to see a small vintage teapot that has a curved golden spout and a "
-        "painted blue dragon which is chasing a tiny phoenix around its belly while steam rises slowly"
+        "painted blue dragon which is chasing a tiny phoenix around it while steam rises slowly"
     )
     result = refine(prompt, {})
     assert "reduced" in result.how

@@ -1,0 +1,5 @@
+"""`python -m jaxphys`."""
+
+from jaxphys.cli.main import main
+
+main()

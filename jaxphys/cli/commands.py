@@ -1,0 +1,199 @@
+"""What each command takes. Everything heavy is imported when a command runs, so that help is
+quick.
+"""
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+Positional = tyro.conf.Positional
+
+
+def generate(
+    prompt: Positional[str | None] = None,
+    /,
+    *,
+    out: Path,
+    material: str | None = None,
+    config: Path | None = None,
+    seed: int | None = None,
+    width: int | None = None,
+    height: int | None = None,
+    frames: int | None = None,
+    steps: int | None = None,
+    splats: int | None = None,
+    save_splats: bool = False,
+) -> int:
+    """Make an object from a sentence and move it.
+
+    Args:
+        prompt: What the object is, for example "a strawberry". Comes from --config if left out.
+        out: Directory for everything that is made.
+        material: What it is made of; `jaxphys materials` lists them. Default: jelly.
+        config: Scene file: the config.json of an earlier run, or one of your own.
+        seed: Of every random choice. Default: 0.
+        width: Of the video [pixels]. Default: 1958.
+        height: Of the video [pixels]. Default: 1090.
+        frames: Number of pictures. Default: 48.
+        steps: Steps of optimisation.
+        splats: Number of Gaussians at most.
+        save_splats: Also write one .ply for each picture.
+    """
+    from jaxphys.cli.scenes import scene_for
+    from jaxphys.pipeline.generate import generate as run
+
+    changes = {"seed": seed, "width": width, "height": height, "frames": frames}
+    scene = scene_for(config, material, changes)
+    run(prompt, scene, out, steps=steps, splats=splats, save_splats=save_splats, progress=True)
+    return 0
+
+
+def animate(
+    source: Annotated[Positional[Path | None], tyro.conf.arg(metavar="OBJECT")] = None,
+    /,
+    *,
+    out: Path,
+    material: str | None = None,
+    config: Path | None = None,
+    seed: int | None = None,
+    width: int | None = None,
+    height: int | None = None,
+    frames: int | None = None,
+    splats: int | None = None,
+    substep: float | None = None,
+    unsafe_dt: bool = False,
+    save_splats: bool = False,
+) -> int:
+    """Move an object as its material would.
+
+    Args:
+        source: Splats (.ply), a mesh (.obj, .glb), or a directory made by generate.
+        out: Directory for everything that is made.
+        material: What it is made of; `jaxphys materials` lists them. Default: jelly.
+        config: Scene file, ours or PhysGaussian's, in place of the material's own scene.
+        seed: Of every random choice. Default: 0.
+        width: Of the video [pixels]. Default: 1958.
+        height: Of the video [pixels]. Default: 1090.
+        frames: Number of pictures. Default: 48.
+        splats: Number of Gaussians that a mesh becomes. Default: 20000.
+        substep: Time step [s]. Default: as large as is safe.
+        unsafe_dt: Take --substep even if it is beyond what is stable.
+        save_splats: Also write one .ply for each picture.
+    """
+    from jaxphys.cli.scenes import scene_for, with_source
+    from jaxphys.pipeline.animate import animate as run
+
+    changes = {"seed": seed, "width": width, "height": height, "frames": frames, "substep": substep}
+    scene = scene_for(config, material, changes, source)
+    if unsafe_dt:
+        scene = scene_for(None, None, {"unsafe_substep": True}, base=scene)
+    scene, beside = with_source(scene, source, config, splats)
+    run(scene, out, beside=beside, save_splats=save_splats, progress=True)
+    return 0
+
+
+def splat(
+    mesh: Annotated[Positional[Path], tyro.conf.arg(metavar="MESH")],
+    /,
+    *,
+    out: Path,
+    count: int = 20_000,
+    seed: int = 0,
+) -> int:
+    """Turn a textured mesh into Gaussians.
+
+    Args:
+        mesh: A .obj or .glb file.
+        out: The .ply (or .splat) file to write.
+        count: Number of Gaussians.
+        seed: Of the random points.
+    """
+    from jaxphys.pipeline.convert import splat_mesh
+
+    splat_mesh(mesh, out, count=count, seed=seed)
+    return 0
+
+
+def render(
+    file: Annotated[Positional[Path], tyro.conf.arg(metavar="FILE.ply")],
+    /,
+    *,
+    out: Path,
+    azimuth: float = -60.0,
+    elevation: float = 14.0,
+    distance: float | None = None,
+    field_of_view: float = 40.0,
+    width: int = 960,
+    height: int = 540,
+    views: int = 24,
+    background: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> int:
+    """Draw splats: one picture, or a turn around them.
+
+    Args:
+        file: Splats.
+        out: A .png file, or a directory for a full turn.
+        azimuth: Degrees about z; 0 looks from +x.
+        elevation: Degrees above the horizon.
+        distance: From the middle, in the file's units. Default: all is in the picture.
+        field_of_view: Horizontal, degrees.
+        width: Pixels.
+        height: Pixels.
+        views: Number of pictures of the turn.
+        background: Red, green, blue in [0, 1].
+    """
+    from jaxphys.pipeline.convert import render_file
+    from jaxphys.scene.scene import View
+
+    view = View(azimuth, elevation, distance, field_of_view=field_of_view)
+    render_file(file, out, view, width=width, height=height, views=views, background=background)
+    return 0
+
+
+def plan(
+    scene: Annotated[Positional[Path | None], tyro.conf.arg(metavar="SCENE")] = None,
+    /,
+    *,
+    material: str | None = None,
+    object: Path | None = None,
+    json: bool = False,
+) -> int:
+    """Tell what a scene needs, what is left out of its program and why, the time step and its
+    bound.
+
+    Args:
+        scene: A scene file, ours or PhysGaussian's, or a directory of an earlier run.
+        material: Plan this material's own scene instead.
+        object: The object to plan with; without it, a ball of the same size stands in.
+        json: Print JSON.
+    """
+    from jaxphys.cli.scenes import scene_for, with_source
+    from jaxphys.scene.plan import as_text, make_plan
+
+    config = scene / "config.json" if scene is not None and scene.is_dir() else scene
+    asked = scene_for(config, material, {})
+    asked, beside = with_source(asked, object, config, None, required=False)
+    print(as_text(make_plan(asked, beside), as_json=json))
+    return 0
+
+
+def materials(*, json: bool = False) -> int:
+    """List the materials, their parameters and defaults.
+
+    Args:
+        json: Print JSON.
+    """
+    from jaxphys.cli.listing import materials_text
+
+    print(materials_text(as_json=json))
+    return 0
+
+
+def doctor() -> int:
+    """Check the installed JAX against known answers; status 1 if one is wrong."""
+    from jaxphys.cli.doctor import report
+
+    text, healthy = report()
+    print(text)
+    return 0 if healthy else 1

@@ -1,0 +1,48 @@
+"""The command line: thin commands over the pipeline."""
+
+import sys
+import warnings
+from collections.abc import Sequence
+
+import tyro
+
+from jaxphys.cli import commands
+from jaxphys.core.errors import InputError
+
+INTERRUPTED = 130
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Runs one command; returns the exit status.
+
+    What a user can mend is one line on standard error and status 2; an interrupt is 130.
+    """
+    try:
+        status = tyro.extras.subcommand_cli_from_dict(
+            {
+                "generate": commands.generate,
+                "animate": commands.animate,
+                "splat": commands.splat,
+                "render": commands.render,
+                "plan": commands.plan,
+                "materials": commands.materials,
+                "doctor": commands.doctor,
+            },
+            prog="jaxphys",
+            description="Objects from text, meshes or splats that move as their material would.",
+            args=None if arguments is None else list(arguments),
+        )
+    except InputError as error:
+        print(f"jaxphys: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("jaxphys: interrupted; the same command resumes", file=sys.stderr)
+        return INTERRUPTED
+    return status or 0
+
+
+def main() -> None:
+    """Entry point of the `jaxphys` command."""
+    # Warnings of libraries tell users of this command nothing that they could act on.
+    warnings.simplefilter("ignore")
+    sys.exit(run())

@@ -1,0 +1,81 @@
+"""From command line arguments to a scene."""
+
+import dataclasses
+import sys
+from pathlib import Path
+from typing import Any
+
+from jaxphys.core.errors import InputError
+from jaxphys.mpm.materials import get_material
+from jaxphys.scene.defaults import default_scene
+from jaxphys.scene.read import read_scene
+from jaxphys.scene.scene import Scene
+
+
+def scene_for(
+    config: Path | None,
+    material: str | None,
+    changes: dict[str, Any],
+    source: Path | None = None,
+    base: Scene | None = None,
+) -> Scene:
+    """The scene of a file or of a material, with the given fields changed where they are not None.
+
+    Prints the notes of an imported file on standard error. Without file and material, the
+    config.json of a directory given as `source` counts, then jelly.
+
+    Raises:
+        InputError: an unknown material, a bad file or a value out of range.
+    """
+    if config is None and material is None and source is not None and source.is_dir():
+        config = source / "config.json"
+    if base is not None:
+        scene = base
+    elif config is not None:
+        loaded = read_scene(config)
+        scene = loaded.scene
+        for note in loaded.notes:
+            print(f"note: {note}", file=sys.stderr)
+        if material is not None:
+            get_material(material)
+            first = dataclasses.replace(scene.objects[0], material=material, parameters={})
+            scene = dataclasses.replace(scene, objects=(first, *scene.objects[1:]))
+    else:
+        scene = default_scene(material or "jelly")
+    given = {name: value for name, value in changes.items() if value is not None}
+    try:
+        return dataclasses.replace(scene, **given)
+    except InputError as error:
+        raise InputError(f"--{error}") from None
+
+
+def with_source(
+    scene: Scene,
+    source: Path | None,
+    config: Path | None,
+    splats: int | None,
+    required: bool = True,
+) -> tuple[Scene, Path | None]:
+    """The scene with its first object read from `source`, and the directory that relative sources
+    of
+    other objects are looked up in first.
+
+    Raises:
+        InputError: no object is named anywhere.
+    """
+    first = scene.objects[0]
+    beside = config.parent if config is not None else None
+    if source is not None:
+        if source.is_dir():
+            source = source / "gaussians.ply"
+        first = dataclasses.replace(first, source=str(source.absolute()))
+    elif first.source is None and required:
+        raise InputError(
+            "OBJECT: name splats (.ply), a mesh (.obj, .glb) or a directory of generate"
+        )
+    if splats is not None:
+        try:
+            first = dataclasses.replace(first, splats=splats)
+        except InputError as error:
+            raise InputError(f"--{error}") from None
+    return dataclasses.replace(scene, objects=(first, *scene.objects[1:])), beside
