@@ -1,0 +1,136 @@
+"""Fracture: a law that loses its tension for good once stretched too far, and a count of the pieces
+it leaves.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from jaxphys.core.errors import InputError
+from jaxphys.core.spectral import left_isotropic
+from jaxphys.mpm.elasticity import (
+    ELASTIC_PARAMETERS,
+    hencky_energy,
+    hencky_principal_energy,
+    lame,
+)
+from jaxphys.mpm.law import Law, Parameters
+from jaxphys.mpm.plasticity import apply_change
+
+
+def damage_of_strain(strain: Array, fracture_strain: Array, softening_strain: Array) -> Array:
+    """Damage in [0, 1] of a particle whose largest principal log strain is `strain`, all (...).
+
+    Zero up to `fracture_strain`. Beyond it the tension (1 - d) * strain falls along a straight line
+    and is gone at `fracture_strain + softening_strain`: d = 1 - (e_c / e) (e_f - e) / (e_f - e_c).
+    """
+    end = fracture_strain + softening_strain
+    reached = jnp.clip(strain, fracture_strain, end)
+    return 1 - (fracture_strain / reached) * (end - reached) / softening_strain
+
+
+def _tension_and_compression(e: Array):
+    total = e[0] + e[1] + e[2]
+    return jnp.maximum(e, 0), jnp.minimum(e, 0), jnp.maximum(total, 0), jnp.minimum(total, 0)
+
+
+def fracture_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple[Array]]:
+    """Damage and stress in principal log strains (3, ...), for `left_isotropic`.
+
+    Damage never decreases. It takes away the share of the stress that resists stretching (e > 0,
+    tr(e) > 0) and leaves the share that resists compression (the spectral split of Miehe et al.
+    2010, eq. 28), so broken faces still push. Strain beyond the end of softening opens a gap
+    instead of being stored.
+
+    Args:
+        e: trial log strains.
+        arguments: mu, lambda [Pa], fracture strain, softening strain, damage, each (...).
+
+    Returns:
+        (exp(change) - 1, principal Kirchhoff stress [Pa]), (the new damage,).
+    """
+    mu, lam, fracture_strain, softening_strain, damage = arguments
+    largest = jnp.maximum(jnp.maximum(e[0], e[1]), e[2])
+    damage = jnp.maximum(damage, damage_of_strain(largest, fracture_strain, softening_strain))
+    opened = jnp.maximum(e - (fracture_strain + softening_strain), 0)
+    stretch, squeeze, swelling, shrinking = _tension_and_compression(e - opened)
+    stress = (1 - damage) * (2 * mu * stretch + lam * swelling) + (
+        2 * mu * squeeze + lam * shrinking
+    )
+    return (jnp.expm1(-opened), stress), (damage,)
+
+
+def _arguments(parameters: Parameters, damage: Array):
+    return (
+        *lame(parameters),
+        parameters["fracture_strain"],
+        parameters["softening_strain"],
+        damage,
+    )
+
+
+def _fracture_update(parameters: Parameters, F_trial: Array, history: Array):
+    arguments = _arguments(parameters, history[0])
+    (change, stress), (damage,) = left_isotropic(fracture_values, F_trial, arguments)
+    return apply_change(change, F_trial), stress, damage[None]
+
+
+def _damaged_energy_value(e, arguments):
+    mu, lam, damage = arguments
+    stretch, squeeze, swelling, shrinking = _tension_and_compression(e)
+    lost = mu * jnp.sum(stretch**2, axis=0) + 0.5 * lam * swelling**2
+    kept = mu * jnp.sum(squeeze**2, axis=0) + 0.5 * lam * shrinking**2
+    return (), ((1 - damage) * lost + kept,)
+
+
+def damaged_energy(parameters: Parameters, F: Array, damage: Array) -> Array:
+    """Stored energy per rest volume [J/m^3] at a given damage, shape (...) (Miehe et al. 2010, eq.
+    27).
+    """
+    (_, (energy,)) = left_isotropic(_damaged_energy_value, F, (*lame(parameters), damage))
+    return energy
+
+
+FRACTURE = Law(
+    name="fracture",
+    parameters=(*ELASTIC_PARAMETERS, "fracture_strain", "softening_strain"),
+    history=(0.0,),
+    history_names=("damage",),
+    update=_fracture_update,
+    energy=hencky_energy,
+    principal_energy=hencky_principal_energy,
+    plastic=True,
+)
+
+
+def number_of_pieces(positions, radius: float, minimum_size: int = 1) -> int:
+    """How many connected pieces the points form, two points being connected if no farther apart
+    than `radius`.
+
+    Runs on the host.
+
+    Args:
+        positions: (N, 3) [m].
+        radius: [m]; a little over the particle spacing finds the pieces that MPM separates at a
+            grid cell.
+        minimum_size: pieces of fewer points are dust and do not count.
+
+    Raises:
+        InputError: positions are not finite, or not (N, 3), or radius is not positive.
+    """
+    positions = np.asarray(positions, dtype=np.float64)
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        raise InputError(f"number_of_pieces: positions have shape {positions.shape}, need (N, 3)")
+    if not np.isfinite(positions).all():
+        raise InputError("number_of_pieces: some positions are not finite; check the simulation")
+    if not radius > 0:
+        raise InputError(f"number_of_pieces: radius is {radius}, must be positive")
+    if len(positions) == 0:
+        return 0
+    pairs = cKDTree(positions).query_pairs(radius, output_type="ndarray")
+    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (len(positions),) * 2)
+    _, labels = connected_components(links, directed=False)
+    return int(np.sum(np.bincount(labels) >= minimum_size))
