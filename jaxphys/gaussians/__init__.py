@@ -13,6 +13,10 @@ from .gaussians import to_splats as to_splats
 from .gaussians import transform as transform
 from .gaussians import view_colours as view_colours
 from .gaussians import with_degree as with_degree
+from .mesh import Mesh as Mesh
+from .mesh import load_mesh as load_mesh
 from .ply import read_ply as read_ply
 from .ply import write_ply as write_ply
 from .splat_file import write_splat as write_splat
+from .surface import gaussians_from_mesh as gaussians_from_mesh
+from .surface import sample_surface as sample_surface
