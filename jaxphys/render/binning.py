@@ -1,0 +1,202 @@
+"""Which splats each tile draws, nearest first, with static shapes.
+
+Splats are sorted by depth once. Each then emits one pair (tile, depth rank) for every tile of its
+box, so that pairs lie in depth order, into an array of `capacity` slots; sorting the single integer
+`tile << bits | rank` gives every tile a contiguous run in depth order. All of it is exact: depths
+are compared with all their bits and no list is cut short, unless the capacity is too small, which
+is reported and leaves out the farthest pairs.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array, lax
+
+from .projection import Projected
+from .settings import REFERENCE_TILE, Settings
+
+# Pairs are counted in int32; a picture that needs more than this is not drawn, and says so.
+MOST_PAIRS = 2**30
+UNCOUNTABLE = 2**31 - 1
+
+
+class Grid(NamedTuple):
+    """Tiles that cover a picture; the last column and row may reach beyond it. Static."""
+
+    columns: int
+    rows: int
+    tile_size: int
+
+    @property
+    def tiles(self) -> int:
+        return self.columns * self.rows
+
+
+class Boxes(NamedTuple):
+    """Tiles touched by each splat, in order of depth; splats that touch none have count 0.
+
+    Attributes:
+        order: which splat is at each depth rank, shape (N,).
+        left, top, columns: the box of tiles, shape (N,) each.
+        counts: tiles in the box, shape (N,).
+        starts: pairs emitted by nearer splats, shape (N,).
+        required: pairs emitted by all splats, or 2^31 - 1 if they are more than 2^30.
+    """
+
+    order: Array
+    left: Array
+    top: Array
+    columns: Array
+    counts: Array
+    starts: Array
+    required: Array
+
+
+class TileLists(NamedTuple):
+    """The sorted pairs.
+
+    Attributes:
+        ranks: depth rank of the splat in each slot, a tile's slots contiguous, shape (capacity,).
+        offsets: first slot of each tile, and the end of the last, shape (tiles + 1,).
+    """
+
+    ranks: Array
+    offsets: Array
+
+
+def make_grid(width: int, height: int, settings: Settings) -> Grid:
+    """The tiles of a picture of `width` x `height` pixels."""
+    size = settings.tile_size
+    return Grid(-(-width // size), -(-height // size), size)
+
+
+def depth_order(depths: Array, valid: Array) -> Array:
+    """Indices of splats by increasing depth, equal depths by index, those not drawn last."""
+    far = jnp.where(valid, depths, jnp.inf)
+    if far.dtype == jnp.float32:
+        # Positive floats are ordered as their bits are, and integers sort faster.
+        far = lax.bitcast_convert_type(far, jnp.uint32)
+    return jnp.argsort(far, stable=True).astype(jnp.int32)
+
+
+def tile_boxes(projected: Projected, grid: Grid, settings: Settings) -> Boxes:
+    """The box of tiles of every splat, and how many pairs that makes."""
+    projected = Projected(*map(lax.stop_gradient, projected))
+    order = depth_order(projected.depths, projected.valid)
+    low, high = _pixel_box(projected, grid, settings)
+    size = grid.tile_size
+    limits = jnp.array([[grid.columns], [grid.rows]], jnp.int32)
+    first = jnp.clip(low // size, 0, limits)
+    last = jnp.clip(-(-high // size), first, limits)
+    columns, rows = last - first
+    counts = jnp.where(projected.valid, columns * rows, 0)
+
+    # A sum in floating point tells whether the sum in integers can be trusted.
+    total = jnp.sum(counts.astype(jnp.float32))
+    countable = total <= MOST_PAIRS
+    counts = jnp.where(countable, counts, 0)[order]
+    ends = jnp.cumsum(counts, dtype=jnp.int32)
+    last_end = ends[-1] if counts.shape[0] else jnp.int32(0)
+    return Boxes(
+        order=order,
+        left=first[0][order],
+        top=first[1][order],
+        columns=columns[order],
+        counts=counts,
+        starts=ends - counts,
+        required=jnp.where(countable, last_end, UNCOUNTABLE),
+    )
+
+
+def _pixel_box(projected: Projected, grid: Grid, settings: Settings) -> tuple[Array, Array]:
+    """First pixel and one past the last pixel that a splat may touch, int32 (2, N) each."""
+    size = grid.tile_size
+    limits = jnp.array([[grid.columns], [grid.rows]], projected.centres.dtype) * size
+    if settings.extent == "three_sigma":
+        # Kerbl et al. 2023 number pixel centres by integers and round to whole tiles of 16.
+        base = projected.centres - 0.5
+        coarse = REFERENCE_TILE
+        low = jnp.trunc((base - projected.radii) / coarse) * coarse
+        high = jnp.trunc((base + projected.radii + (coarse - 1)) / coarse) * coarse
+    else:
+        # A little slack: the test of each pixel decides, in whatever order it was rounded.
+        reach = projected.half_sizes * (1 + 1e-4) + 1e-2
+        low = jnp.ceil(projected.centres - reach - 0.5)
+        high = jnp.floor(projected.centres + reach - 0.5) + 1
+    low, high = jnp.clip(low, 0, limits), jnp.clip(high, 0, limits)
+    empty = high <= low
+    return low.astype(jnp.int32), jnp.where(empty, low, high).astype(jnp.int32)
+
+
+def tile_lists(
+    projected: Projected, boxes: Boxes, grid: Grid, settings: Settings, capacity: int
+) -> TileLists:
+    """Emits the pairs into `capacity` slots, drops those whose ellipse misses the tile, and sorts.
+
+    One uint32 holds tile and rank where their bits suffice; otherwise tiles are sorted stably with
+    the rank as payload, which gives the same lists since pairs are emitted in depth order.
+    """
+    count = boxes.order.shape[0]
+    slots = jnp.arange(capacity, dtype=jnp.int32)
+    owners = slot_owners(boxes, capacity)
+    rows = jnp.stack([boxes.starts, boxes.left, boxes.top, boxes.columns], axis=-1)
+    start, left, top, columns = rows[owners].T
+    local = slots - start
+    down = local // jnp.maximum(columns, 1)
+    column, row = left + local - down * columns, top + down
+    kept = (slots < boxes.required) & _meets(projected, boxes, owners, column, row, grid, settings)
+    tiles = jnp.where(kept, row * grid.columns + column, grid.tiles)
+
+    rank_bits = max(count - 1, 0).bit_length()
+    boundaries = jnp.arange(grid.tiles + 1)
+    if grid.tiles.bit_length() + rank_bits <= 32:
+        keys = (tiles.astype(jnp.uint32) << rank_bits) | jnp.where(kept, owners, 0).astype(
+            jnp.uint32
+        )
+        keys = jnp.sort(keys)
+        offsets = jnp.searchsorted(keys, boundaries.astype(jnp.uint32) << rank_bits)
+        ranks = (keys & jnp.uint32(2**rank_bits - 1)).astype(jnp.int32)
+    else:
+        keys, ranks = lax.sort((tiles, owners), num_keys=1, is_stable=True)
+        offsets = jnp.searchsorted(keys, boundaries.astype(jnp.int32))
+    return TileLists(ranks, offsets.astype(jnp.int32))
+
+
+def slot_owners(boxes: Boxes, capacity: int) -> Array:
+    """Depth rank of the splat that owns each emission slot, shape (capacity,)."""
+    # Ranks of splats that emit anything are written where their runs start and carried forward.
+    count = boxes.order.shape[0]
+    where = jnp.where(boxes.counts > 0, boxes.starts, capacity)
+    marks = (
+        jnp.zeros(capacity, jnp.int32)
+        .at[where]
+        .set(jnp.arange(count, dtype=jnp.int32), mode="drop")
+    )
+    return lax.cummax(marks)
+
+
+def _meets(projected, boxes, owners, column, row, grid, settings) -> Array:
+    """Whether the ellipse alpha = alpha_min reaches the pixel centres of the tile, per slot.
+
+    The smallest value of a convex quadratic over a rectangle that does not hold its centre lies on
+    one of the two facing edges, where it is that of a parabola at its clamped vertex.
+    """
+    size = grid.tile_size
+    opacities = jnp.where(projected.valid, projected.opacities, settings.alpha_min)
+    level = 2 * jnp.log(opacities / settings.alpha_min)
+    table = jnp.concatenate([projected.centres, projected.factors, level[None]])
+    x, y, a, b, c, level = lax.stop_gradient(table).T[boxes.order][owners].T
+    # Distances centre - pixel over the rectangle of the tile's pixel centres.
+    x_high = x - (column * size + 0.5)
+    x_low = x_high - (size - 1)
+    y_high = y - (row * size + 0.5)
+    y_low = y_high - (size - 1)
+    x_near, y_near = jnp.clip(0, x_low, x_high), jnp.clip(0, y_low, y_high)
+
+    def doubled(dx: Array, dy: Array) -> Array:
+        return (a * dx + b * dy) ** 2 + (c * dy) ** 2
+
+    on_row = doubled(jnp.clip(-(b / a) * y_near, x_low, x_high), y_near)
+    vertex = -(a / (b * b + c * c)) * b * x_near
+    on_column = doubled(x_near, jnp.clip(vertex, y_low, y_high))
+    return jnp.minimum(on_row, on_column) <= level * (1 + 1e-4) + 1e-3
