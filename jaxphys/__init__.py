@@ -1,1 +1,66 @@
-"""Text, meshes or splats to 3D Gaussians that move as their material would, in pure JAX."""
+"""Text, meshes or splats to 3D Gaussians that move as their material would, differentiable end to
+end.
+
+The names below are loaded when first used, so that `import jaxphys` is quick.
+"""
+
+import importlib
+import importlib.metadata
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .core.errors import InputError as InputError
+    from .gaussians.gaussians import Gaussians as Gaussians
+    from .mpm.adjoint import Checkpointed as Checkpointed
+    from .mpm.adjoint import Plain as Plain
+    from .mpm.rollout import SimulationError as SimulationError
+    from .pipeline.animate import animate as animate
+    from .pipeline.draw import draw as draw
+    from .pipeline.generate import generate as generate
+    from .pipeline.rollout import rollout_frames as rollout_frames
+    from .pipeline.simulate import simulate as simulate
+    from .render.camera import look_at as look_at
+    from .render.camera import orbit as orbit
+    from .render.renderer import render as render
+    from .scene.build import Simulation as Simulation
+    from .scene.build import build as build
+    from .scene.defaults import default_scene as default_scene
+    from .scene.read import read_scene as read_scene
+    from .scene.scene import Object as Object
+    from .scene.scene import Scene as Scene
+    from .scene.source import load as load
+
+_HOMES = {
+    "InputError": "core.errors",
+    "Gaussians": "gaussians.gaussians",
+    "Checkpointed": "mpm.adjoint",
+    "Plain": "mpm.adjoint",
+    "SimulationError": "mpm.rollout",
+    "animate": "pipeline.animate",
+    "draw": "pipeline.draw",
+    "generate": "pipeline.generate",
+    "rollout_frames": "pipeline.rollout",
+    "simulate": "pipeline.simulate",
+    "look_at": "render.camera",
+    "orbit": "render.camera",
+    "render": "render.renderer",
+    "Simulation": "scene.build",
+    "build": "scene.build",
+    "default_scene": "scene.defaults",
+    "read_scene": "scene.read",
+    "Object": "scene.scene",
+    "Scene": "scene.scene",
+    "load": "scene.source",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return importlib.metadata.version("jaxphys-splats")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'jaxphys' has no attribute {name!r}")
+    return getattr(importlib.import_module(f"jaxphys.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*_HOMES, "__version__"])

@@ -1,0 +1,87 @@
+"""One file in, one file or a folder of pictures out: meshes to splats, splats to pictures."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxphys.core.errors import InputError
+from jaxphys.gaussians.gaussians import Gaussians, opacities, scales, to_splats
+from jaxphys.gaussians.ply import read_ply, write_ply
+from jaxphys.gaussians.splat_file import write_splat
+from jaxphys.pipeline.framing import frame_cameras
+from jaxphys.pipeline.output import run_directory
+from jaxphys.pipeline.video import write_picture
+from jaxphys.render.camera import position
+from jaxphys.render.renderer import render
+from jaxphys.scene.scene import View
+from jaxphys.scene.source import load
+
+
+def splat_mesh(mesh: str | os.PathLike, out: str | os.PathLike, *, count: int, seed: int) -> None:
+    """Writes a mesh as `count` Gaussians to a .ply or .splat file.
+
+    Raises:
+        InputError: the mesh cannot be read, or `out` has another ending.
+    """
+    writers = {".ply": write_ply, ".splat": write_splat}
+    out = Path(out)
+    if out.suffix.lower() not in writers:
+        raise InputError(f"--out {out}: must end in .ply or .splat")
+    if count < 1:
+        raise InputError(f"--count {count}: must be at least 1")
+    writers[out.suffix.lower()](out, load(mesh, count=count, seed=seed))
+
+
+def outline(gaussians: Gaussians) -> np.ndarray:
+    """Points (M, 3) that bound what is seen: centres, and two standard deviations to each side."""
+    seen = np.asarray(opacities(gaussians)) > 0.05
+    if not seen.any():
+        seen[:] = True
+    means = np.asarray(gaussians.means)[seen]
+    size = 2 * np.asarray(scales(gaussians)).max(axis=1)[seen]
+    size = np.minimum(size, np.quantile(size, 0.99))[:, None]
+    return np.concatenate([means + sign * size * axis for axis in np.eye(3) for sign in (1, -1)])
+
+
+def render_file(
+    file: str | os.PathLike,
+    out: str | os.PathLike,
+    view: View,
+    *,
+    width: int,
+    height: int,
+    views: int,
+    background: tuple[float, float, float],
+) -> None:
+    """Draws a .ply of splats to a .png file, or as `views` pictures of a full turn to a directory.
+
+    Raises:
+        InputError: the file cannot be read, or a number is out of range.
+    """
+    for name, value, most in (
+        ("width", width, 8192),
+        ("height", height, 8192),
+        ("views", views, 10_000),
+    ):
+        if not 1 <= value <= most:
+            raise InputError(f"--{name} {value}: must lie between 1 and {most}")
+    if min(background) < 0 or max(background) > 1:
+        raise InputError(f"--background {background}: red, green and blue lie between 0 and 1")
+    gaussians = read_ply(file)
+    out = Path(out)
+    single = out.suffix.lower() == ".png"
+    if not single and out.suffix:
+        raise InputError(f"--out {out}: must end in .png, or name a directory")
+    points = outline(gaussians)
+    count = 1 if single else views
+    turning = view if single else replace(view, turn=360 / views)
+    cameras = frame_cameras(turning, [points] * count, 1.0, width, height)
+    directory = None if single else run_directory(out)
+    for index, camera in enumerate(cameras):
+        splats = to_splats(gaussians, position(camera))
+        image = render(splats, camera, background=jnp.asarray(background, jnp.float32))
+        pixels = np.asarray(jnp.round(255 * jnp.clip(image.colour, 0, 1)).astype(jnp.uint8))
+        write_picture(out if single else directory / f"{index:04d}.png", pixels)

@@ -1,0 +1,58 @@
+"""Gaussians from whatever file a scene names."""
+
+from pathlib import Path
+
+from jaxphys.core.errors import InputError
+from jaxphys.gaussians.gaussians import Gaussians
+from jaxphys.gaussians.ply import read_ply
+from jaxphys.scene.scene import Object
+
+MESHES = (".obj", ".glb", ".gltf", ".stl", ".off")
+
+
+def find(source: str, beside: Path | None) -> Path:
+    """The path of a source: as it stands, or relative to the directory of the scene's file."""
+    path = Path(source)
+    if beside is not None and not path.is_absolute() and (beside / path).exists():
+        path = beside / path
+    return path / "gaussians.ply" if path.is_dir() else path
+
+
+def load_object(thing: Object, beside: Path | None, seed: int, where: str) -> Gaussians:
+    """The Gaussians of an object: read, or made from a mesh.
+
+    Raises:
+        InputError: no source, or one that cannot be read, with the file's name.
+    """
+    if thing.source is None:
+        raise InputError(f"{where}.source: is missing; name splats (.ply) or a mesh (.obj, .glb)")
+    return load(find(thing.source, beside), count=thing.splats, seed=seed)
+
+
+def load(path: str | Path, *, count: int = 20_000, seed: int = 0) -> Gaussians:
+    """The Gaussians of a .ply file of splats, of a directory of `generate`, or of a mesh.
+
+    Args:
+        path: the file.
+        count: Gaussians that a mesh becomes.
+        seed: of the random points on a mesh.
+
+    Raises:
+        InputError: the file is missing, foreign or broken.
+    """
+    path = Path(path)
+    if path.is_dir():
+        path = path / "gaussians.ply"
+    suffix = path.suffix.lower()
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if suffix == ".ply":
+        return read_ply(path)
+    if suffix in MESHES:
+        from jaxphys.gaussians.mesh import load_mesh
+        from jaxphys.gaussians.surface import gaussians_from_mesh
+
+        return gaussians_from_mesh(load_mesh(path), count, seed)
+    raise InputError(
+        f"{path}: neither splats (.ply) nor a mesh ({', '.join(MESHES)}); convert it to one"
+    )
