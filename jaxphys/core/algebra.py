@@ -7,6 +7,7 @@ particles; a batched `dot_general` of
 3x3 matrices does not, and is what jaxlib 0.10.2 computes wrongly.
 """
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -32,29 +33,41 @@ def trace(A: Array) -> Array:
     return A[0, 0] + A[1, 1] + A[2, 2]
 
 
+def entries(A: Array) -> list[list[Array]]:
+    """The nine entries of (3, 3, ...) as a list of three rows.
+
+    Under reverse mode this turns back into one concatenation, where indexing `A[i, j]` entry by
+    entry would turn into as many padded arrays to add up.
+    """
+    nine = jax.lax.split(A.reshape((9, *A.shape[2:])), (1,) * 9, axis=0)
+    return [[nine[3 * i + j].reshape(A.shape[2:]) for j in range(3)] for i in range(3)]
+
+
+def components(v: Array) -> list[Array]:
+    """The three components of (3, ...), for the same reason as `entries`."""
+    return [x.reshape(v.shape[1:]) for x in jax.lax.split(v, (1,) * 3, axis=0)]
+
+
 def matmul(A: Array, B: Array) -> Array:
     """A @ B for (3, 3, ...) arrays."""
+    a, b = entries(A), entries(B)
     return stack_matrix(
-        [
-            [A[i, 0] * B[0, j] + A[i, 1] * B[1, j] + A[i, 2] * B[2, j] for j in range(3)]
-            for i in range(3)
-        ]
+        [[row[0] * b[0][j] + row[1] * b[1][j] + row[2] * b[2][j] for j in range(3)] for row in a]
     )
 
 
 def matmul_transpose(A: Array, B: Array) -> Array:
     """A @ B^T for (3, 3, ...) arrays."""
+    a, b = entries(A), entries(B)
     return stack_matrix(
-        [
-            [A[i, 0] * B[j, 0] + A[i, 1] * B[j, 1] + A[i, 2] * B[j, 2] for j in range(3)]
-            for i in range(3)
-        ]
+        [[row[0] * other[0] + row[1] * other[1] + row[2] * other[2] for other in b] for row in a]
     )
 
 
 def matvec(A: Array, v: Array) -> Array:
     """A @ v for A (3, 3, ...) and v (3, ...)."""
-    return jnp.stack([A[i, 0] * v[0] + A[i, 1] * v[1] + A[i, 2] * v[2] for i in range(3)])
+    v = components(v)
+    return jnp.stack([row[0] * v[0] + row[1] * v[1] + row[2] * v[2] for row in entries(A)])
 
 
 def outer(u: Array, v: Array) -> Array:
@@ -65,20 +78,19 @@ def outer(u: Array, v: Array) -> Array:
 def cofactor(A: Array) -> Array:
     """Cofactor matrix: det(A) A^-T, also where A is singular. Shape (3, 3, ...)."""
 
+    A = entries(A)
+
     def minor(i: int, j: int) -> Array:
         (a, b), (c, d) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
-        return A[a, c] * A[b, d] - A[a, d] * A[b, c]
+        return A[a][c] * A[b][d] - A[a][d] * A[b][c]
 
     return stack_matrix([[minor(i, j) for j in range(3)] for i in range(3)])
 
 
 def determinant(A: Array) -> Array:
     """Determinant of (3, 3, ...), shape (...)."""
-    return (
-        A[0, 0] * (A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1])
-        - A[0, 1] * (A[1, 0] * A[2, 2] - A[1, 2] * A[2, 0])
-        + A[0, 2] * (A[1, 0] * A[2, 1] - A[1, 1] * A[2, 0])
-    )
+    (a, b, c), (d, e, f), (g, h, i) = entries(A)
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
 def inverse(A: Array) -> Array:

@@ -8,91 +8,136 @@ difference, whose limit is an ordinary derivative.
 Arrays are (3, 3, ...), the particle axis last; see `core.algebra`.
 """
 
+import math
 from collections.abc import Callable
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 from jax import Array
+from jax.lax import optimization_barrier
 
 from jaxphys.core import algebra
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 
 
-def sweeps_needed(dtype) -> int:
-    """Cyclic Jacobi sweeps after which a 3x3 matrix of `dtype` is diagonal to round-off."""
-    return 4 if jnp.finfo(dtype).bits <= 32 else 5
-
-
-def _jacobi(A: Array, sweeps: int) -> tuple[Array, Array]:
-    a = {(i, j): A[i, j] for i in range(3) for j in range(i, 3)}
-    one, zero = jnp.ones_like(A[0, 0]), jnp.zeros_like(A[0, 0])
-    Q = [[one if i == j else zero for j in range(3)] for i in range(3)]
-    tiny = jnp.finfo(A.dtype).tiny
-    for _ in range(sweeps):
-        for p, q in PAIRS:
-            r = 3 - p - q
-            off = a[p, q]
-            gap = a[q, q] - a[p, p]
-            divisor = jnp.abs(gap) + jnp.sqrt(gap * gap + 4 * off * off) + tiny
-            # The smaller of the two rotations has |tan| <= 1; the clip only acts where squares
-            # underflow.
-            tangent = jnp.clip(jnp.where(gap < 0, -2 * off, 2 * off) / divisor, -1, 1)
-            c = jax.lax.rsqrt(1 + tangent * tangent)
-            s = tangent * c
-            a[p, p] = a[p, p] - tangent * off
-            a[q, q] = a[q, q] + tangent * off
-            a[p, q] = zero
-            pr, qr = (min(p, r), max(p, r)), (min(q, r), max(q, r))
-            a[pr], a[qr] = c * a[pr] - s * a[qr], s * a[pr] + c * a[qr]
-            for row in Q:
-                row[p], row[q] = c * row[p] - s * row[q], s * row[p] + c * row[q]
-    return jnp.stack([a[i, i] for i in range(3)]), algebra.stack_matrix(Q)
-
-
 def _to_frame(Q: Array, A: Array) -> Array:
     """Q^T A Q."""
-    return algebra.matmul(algebra.transpose(Q), algebra.matmul(A, Q))
+    half = optimization_barrier(algebra.matmul(A, Q))
+    return optimization_barrier(algebra.matmul(algebra.transpose(Q), half))
 
 
 def _from_frame(Q: Array, A: Array) -> Array:
     """Q A Q^T."""
-    return algebra.matmul_transpose(algebra.matmul(Q, A), Q)
+    half = optimization_barrier(algebra.matmul(Q, A))
+    return algebra.matmul_transpose(half, Q)
 
 
 def _from_principal(Q: Array, values: Array) -> Array:
     """Q diag(values) Q^T, each of the six different entries once."""
-    scaled = [[Q[i, k] * values[k] for k in range(3)] for i in range(3)]
-    entry = {
-        (i, j): sum(scaled[i][k] * Q[j, k] for k in range(3)) for i in range(3) for j in range(i, 3)
-    }
+    Q, values = algebra.entries(Q), algebra.components(values)
+    scaled = [[Q[i][k] * values[k] for k in range(3)] for i in range(3)]
+    entry = {(i, j): _dot(scaled[i], Q[j]) for i in range(3) for j in range(i, 3)}
     return algebra.stack_matrix([[entry[min(i, j), max(i, j)] for j in range(3)] for i in range(3)])
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(1,))
-def eigen_symmetric(A: Array, sweeps: int | None = None) -> tuple[Array, Array]:
+def _dot(u, v):
+    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+
+
+def _isolated_root(half_determinant: Array) -> Array:
+    """The root of x^3 = 3 x + 2 h that is farthest from the other two, for h in [-1, 1].
+
+    Its size lies in [sqrt(3), 2], where Newton's method, started from a parabola through the ends,
+    is right to round-off after three (float32) or four steps, and where x hardly depends on errors
+    of h.
+    """
+    h = jnp.minimum(jnp.abs(half_determinant), 1)
+    x = math.sqrt(3) + h * (1 / 3 - h * (math.sqrt(3) - 5 / 3))
+    for _ in range(3 if jnp.finfo(h.dtype).bits <= 32 else 4):
+        x = x - (x * (x * x - 3) - 2 * h) / (3 * (x * x - 1))
+    return jnp.where(half_determinant < 0, -x, x)
+
+
+@jax.custom_jvp
+def eigen_symmetric(A: Array) -> tuple[Array, Array]:
     """Eigenvalues (3, ...), in no particular order, and eigenvectors (3, 3, ...) of symmetric (3,
     3, ...).
 
-    `A = Q diag(w) Q^T` with the eigenvectors in the columns of Q. Cyclic Jacobi (Golub and Van Loan
-    2013, section 8.5) with a fixed number of unrolled sweeps: no branch, no loop, and Q is
-    orthogonal to round-off even for repeated eigenvalues. Only the upper triangle is read.
+    `A = Q diag(w) Q^T` with the eigenvectors in the columns of Q. Direct, without iteration to
+    convergence and without branches, and as accurate as Jacobi's method, also where eigenvalues are
+    close (Eberly 2014, "A robust eigensolver for 3x3 symmetric matrices"): the eigenvalue farthest
+    from the other two is a well-conditioned root of the characteristic polynomial and its
+    eigenvector the largest row of a cofactor matrix; what is left is one 2x2 rotation in the plane
+    across it (basis of that plane: Duff et al. 2017). Errors are a few eps of the largest deviation
+    from A's mean eigenvalue. Only the upper triangle is read.
 
     Where eigenvalues are equal the derivative of Q is taken as zero: differentiate isotropic
     functions through `left_isotropic` instead, which is right there.
-
-    Args:
-        A: symmetric matrices.
-        sweeps: how many; by default as many as the dtype needs.
     """
-    return _jacobi(A, sweeps_needed(A.dtype) if sweeps is None else sweeps)
+    # The barriers keep XLA from fusing, and so repeating, all that comes before into each array
+    # that comes after.
+    limits = jnp.finfo(A.dtype)
+    (a, f, e), (_, b, d), (_, _, c) = algebra.entries(A)
+    mean = (a + b + c) / 3
+    diagonal = [a - mean, b - mean, c - mean]
+    # Once more, for what round-off left of the trace where A is nearly a multiple of the identity.
+    rest = (diagonal[0] + diagonal[1] + diagonal[2]) / 3
+    mean, diagonal = mean + rest, [entry - rest for entry in diagonal]
+    beside = [d, e, f]
+    square = (_dot(diagonal, diagonal) + 2 * _dot(beside, beside)) / 6
+    isotropic = square < limits.tiny / limits.eps**2
+    size = jnp.where(isotropic, 0, jnp.sqrt(jnp.where(isotropic, 1, square)))
+    scale = jnp.where(isotropic, 0, jax.lax.rsqrt(jnp.where(isotropic, 1, square)))
+    scale, size, mean = optimization_barrier((scale, size, mean))
+
+    # G = (A - mean I) / size has the characteristic polynomial x^3 - 3 x - det G.
+    a, b, c, d, e, f = (x * scale for x in (*diagonal, *beside))
+    G = ((a, f, e), (f, b, d), (e, d, c))
+    half = 0.5 * (a * (b * c - d * d) - f * (f * c - d * e) + e * (f * d - b * e))
+    x = optimization_barrier(_isolated_root(optimization_barrier(half)))
+    p, q, r = a - x, b - x, c - x
+    C00, C11, C22 = q * r - d * d, p * r - e * e, p * q - f * f
+    C12, C02, C01 = e * f - p * d, d * f - q * e, d * e - r * f
+    C00, C11, C22, C12, C02, C01 = optimization_barrier((C00, C11, C22, C12, C02, C01))
+    first = (C00 >= C11) & (C00 >= C22)
+    second = ~first & (C11 >= C22)
+    v = [
+        jnp.where(first, C00, jnp.where(second, C01, C02)),
+        jnp.where(first, C01, jnp.where(second, C11, C12)),
+        jnp.where(first, C02, jnp.where(second, C12, C22)),
+    ]
+    shorten = optimization_barrier(jax.lax.rsqrt(_dot(v, v)))
+    v = [component * shorten for component in v]
+
+    sign = jnp.where(v[2] < 0, -1, 1).astype(A.dtype)
+    v, sign, slope = optimization_barrier((v, sign, -1 / (sign + v[2])))
+    product = v[0] * v[1] * slope
+    s = [1 + sign * v[0] * v[0] * slope, sign * product, -sign * v[0]]
+    t = [product, sign + v[1] * v[1] * slope, -v[1]]
+    s, t, G = optimization_barrier((s, t, G))
+    Gt = [_dot(row, t) for row in G]
+    vv, ss = (_dot(u, [_dot(row, u) for row in G]) for u in (v, s))
+    vv, ss, tt, st = optimization_barrier((vv, ss, _dot(t, Gt), _dot(s, Gt)))
+    gap = tt - ss
+    tangent = jnp.where(gap < 0, -2 * st, 2 * st) / (
+        jnp.abs(gap) + jnp.sqrt(gap * gap + 4 * st * st) + limits.tiny
+    )
+    # Not above one in size but where squares underflow.
+    tangent = jnp.clip(tangent, -1, 1)
+    tangent, cosine = optimization_barrier((tangent, jax.lax.rsqrt(1 + tangent * tangent)))
+    sine = tangent * cosine
+    w = [mean + size * vv, mean + size * (ss - tangent * st), mean + size * (tt + tangent * st)]
+    Q = [[v[i], cosine * s[i] - sine * t[i], sine * s[i] + cosine * t[i]] for i in range(3)]
+    w, Q = optimization_barrier((w, Q))
+    return jnp.stack(w), algebra.stack_matrix(Q)
 
 
 @eigen_symmetric.defjvp
-def _eigen_symmetric_jvp(sweeps, primals, tangents):
+def _eigen_symmetric_jvp(primals, tangents):
     (A,), (dA,) = primals, tangents
-    w, Q = eigen_symmetric(A, sweeps)
+    w, Q = eigen_symmetric(A)
     D = _to_frame(Q, (dA + algebra.transpose(dA)) / 2)
     turn = jnp.zeros_like(D)
     for i, j in PAIRS:
@@ -112,8 +157,9 @@ def left_strain(F: Array) -> Array:
 def volume_change(F: Array) -> Array:
     """det F - 1, formed from F - I so that small changes keep their digits. Shape (...)."""
     H = F - algebra.identity_like(F)
-    minors = sum(H[i, i] * H[j, j] - H[i, j] * H[j, i] for i, j in PAIRS)
-    return algebra.trace(H) + minors + algebra.determinant(H)
+    (a, b, c), (d, e, f), (g, h, i) = algebra.entries(H)
+    minors = (a * e - b * d) + (a * i - c * g) + (e * i - f * h)
+    return a + e + i + minors + algebra.determinant(H)
 
 
 def _log_stretches(squares_minus_one: Array) -> Array:
@@ -155,25 +201,29 @@ def left_isotropic(
     Returns:
         tuple of symmetric (3, 3, ...) and tuple of (...).
     """
-    w, Q = eigen_symmetric(left_strain(F))
-    values, scalars = function(_log_stretches(w), arguments)
+    w, Q = eigen_symmetric(optimization_barrier(left_strain(F)))
+    logs = optimization_barrier(_log_stretches(w))
+    values, scalars = optimization_barrier(function(logs, arguments))
     return tuple(_from_principal(Q, v) for v in values), tuple(scalars)
 
 
 @left_isotropic.defjvp
 def _left_isotropic_jvp(function, primals, tangents):
     (F, arguments), (dF, darguments) = primals, tangents
-    w, Q = eigen_symmetric(left_strain(F))
-    e = _log_stretches(w)
-    half = algebra.matmul_transpose(dF, F)
+    w, Q = eigen_symmetric(optimization_barrier(left_strain(F)))
+    e = optimization_barrier(_log_stretches(w))
+    half = optimization_barrier(algebra.matmul_transpose(dF, F))
     D = _to_frame(Q, half + algebra.transpose(half))
 
     free = w > 8 * jnp.finfo(F.dtype).eps - 1
-    de = jnp.stack([D[i, i] for i in range(3)]) * jnp.where(free, 0.5 * jnp.exp(-2 * e), 0)
-    (values, scalars), (dvalues, dscalars) = jax.jvp(
-        function, (e, arguments), (de.astype(e.dtype), darguments)
-    )
-    frames = [[[dv[i] if i == j else None for j in range(3)] for i in range(3)] for dv in dvalues]
+    slope = optimization_barrier(jnp.where(free, 0.5 * jnp.exp(-2 * e), 0))
+    D = algebra.entries(D)
+    de = jnp.stack([D[i][i] for i in range(3)]) * slope
+    (values, scalars), (dvalues, dscalars) = jax.jvp(function, (e, arguments), (de, darguments))
+    values, scalars = optimization_barrier((values, scalars))
+    dvalues, dscalars = optimization_barrier((dvalues, dscalars))
+    diagonals = [algebra.components(dv) for dv in dvalues]
+    frames = [[[dv[i] if i == j else None for j in range(3)] for i in range(3)] for dv in diagonals]
     # Below this gap the derivative is nearer to the divided difference than what cancellation
     # leaves of it.
     near = jnp.finfo(F.dtype).eps ** (1 / 3)
@@ -188,10 +238,12 @@ def _left_isotropic_jvp(function, primals, tangents):
         chain = 0.5 * jnp.exp(-e[i] - e[j]) * ratio
         for frame, value, slope in zip(frames, values, slopes, strict=True):
             difference = jnp.where(close, (slope[i] - slope[j]) / 2, (value[i] - value[j]) / safe)
-            frame[i][j] = frame[j][i] = difference * chain * D[i, j]
-    primal = tuple(_from_principal(Q, v) for v in values), tuple(scalars)
-    tangent = tuple(_from_frame(Q, algebra.stack_matrix(f)) for f in frames), tuple(dscalars)
-    return primal, tangent
+            frame[i][j] = frame[j][i] = optimization_barrier(difference * chain) * D[i][j]
+    primal = tuple(_from_principal(Q, v) for v in values), scalars
+    tangent = tuple(
+        _from_frame(Q, optimization_barrier(algebra.stack_matrix(frame))) for frame in frames
+    )
+    return primal, (tangent, dscalars)
 
 
 @jax.custom_jvp
@@ -208,13 +260,11 @@ def polar_rotation(F: Array) -> Array:
     decomposition. The derivative solves Z S + S Z = R^T dF - dF^T R for a skew Z, that is it
     divides by sums of singular values, and holds to every order.
     """
-    size = jnp.sqrt(jnp.sum(F * F, axis=(0, 1)))
-    usable = size > 0
-    identity = algebra.identity_like(F)
-    G = jnp.where(usable, F / jnp.where(usable, size, 1), identity / jnp.sqrt(3.0).astype(F.dtype))
-    C, det = algebra.cofactor(G), algebra.determinant(G)
-    squared = jnp.sum(G * G, axis=(0, 1))
+    C, det = algebra.cofactor(F), algebra.determinant(F)
+    squared = jnp.sum(F * F, axis=(0, 1))
     minors = jnp.sum(C * C, axis=(0, 1))
+    FFt = algebra.matmul_transpose(F, F)
+    C, det, squared, minors, FFt = optimization_barrier((C, det, squared, minors, FFt))
     tiny = jnp.finfo(F.dtype).tiny
     root = jnp.sqrt(3 * squared)
     for _ in range(8 if jnp.finfo(F.dtype).bits <= 32 else 12):
@@ -222,26 +272,30 @@ def polar_rotation(F: Array) -> Array:
         value = excess * excess - 8 * root * det - 4 * minors
         root = root - value / jnp.maximum(4 * root * excess - 8 * det, tiny)
     kappa = 0.5 * (root * root - squared)
-    zeta = kappa * root - det
-    GGtG = algebra.matmul(algebra.matmul_transpose(G, G), G)
-    R = ((kappa + squared) * G + root * C - GGtG) / jnp.maximum(zeta, tiny)
-    gram = algebra.matmul(algebra.transpose(R), R)
-    return algebra.matmul(R, 1.5 * identity - 0.5 * gram)
+    shorten = 1 / jnp.maximum(kappa * root - det, tiny)
+    root, kappa, shorten = optimization_barrier((root, kappa, shorten))
+    R = ((kappa + squared) * F + root * C - algebra.matmul(FFt, F)) * shorten
+    R = optimization_barrier(R)
+    gram = optimization_barrier(algebra.matmul(algebra.transpose(R), R))
+    return 1.5 * R - 0.5 * algebra.matmul(R, gram)
 
 
 @polar_rotation.defjvp
 def _polar_rotation_jvp(primals, tangents):
     (F,), (dF,) = primals, tangents
-    R = polar_rotation(F)
-    S = algebra.matmul(algebra.transpose(R), F)
-    W = algebra.matmul(algebra.transpose(R), dF)
-    axial = jnp.stack([W[2, 1] - W[1, 2], W[0, 2] - W[2, 0], W[1, 0] - W[0, 1]])
-    sums = algebra.trace(S) * algebra.identity_like(S) - S
-    sums = (sums + algebra.transpose(sums)) / 2
+    R = optimization_barrier(polar_rotation(F))
+    S = optimization_barrier(algebra.matmul(algebra.transpose(R), F))
+    W = optimization_barrier(algebra.matmul(algebra.transpose(R), dF))
+    (_, b, c), (d, _, f), (g, h, _) = algebra.entries(W)
+    axial = jnp.stack([h - f, c - g, d - b])
+    sums = algebra.trace(S) * algebra.identity_like(S) - (S + algebra.transpose(S)) / 2
+    sums = optimization_barrier(sums)
     product = algebra.determinant(sums)
     regular = jnp.abs(product) > jnp.finfo(F.dtype).tiny
-    adjugate = algebra.cofactor(sums)
-    z = jnp.where(regular, algebra.matvec(adjugate, axial) / jnp.where(regular, product, 1), 0)
+    share = jnp.where(regular, 1 / jnp.where(regular, product, 1), 0)
+    solver = optimization_barrier(algebra.cofactor(sums) * share)
+    z = optimization_barrier(algebra.matvec(solver, optimization_barrier(axial)))
+    z = algebra.components(z)
     zero = jnp.zeros_like(z[0])
     Z = algebra.stack_matrix([[zero, -z[2], z[1]], [z[2], zero, -z[0]], [-z[1], z[0], zero]])
     return R, algebra.matmul(R, Z)

@@ -22,9 +22,8 @@ def lame(parameters: Parameters) -> tuple[Array, Array]:
 
 def add_to_diagonal(A: Array, value: Array) -> Array:
     """A + value I for A (3, 3, ...) and value (...)."""
-    return algebra.stack_matrix(
-        [[A[i, j] + value if i == j else A[i, j] for j in range(3)] for i in range(3)]
-    )
+    (a, b, c), (d, e, f), (g, h, i) = algebra.entries(A)
+    return algebra.stack_matrix([[a + value, b, c], [d, e + value, f], [g, h, i + value]])
 
 
 def neo_hookean_stress(parameters: Parameters, F: Array) -> Array:
