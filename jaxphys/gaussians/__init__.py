@@ -1,6 +1,11 @@
 """3D Gaussians: the pytree, harmonics, files, meshes, density control, filling and colour."""
 
+from .colour import ColourRange as ColourRange
+from .colour import colour_range as colour_range
+from .colour import regularise as regularise
+from .colour import to_unit_interval as to_unit_interval
 from .gaussians import Gaussians as Gaussians
+from .gaussians import axes as axes
 from .gaussians import concatenate as concatenate
 from .gaussians import covariances as covariances
 from .gaussians import from_points as from_points

@@ -57,16 +57,20 @@ def scales(gaussians: Gaussians) -> Array:
     return jnp.exp(jnp.clip(gaussians.log_scales, -limit, limit))
 
 
-@jax.jit
-def covariances(gaussians: Gaussians) -> Array:
-    """R S S^T R^T [m^2], shape (N, 3, 3), symmetric to the last bit.
+def axes(gaussians: Gaussians) -> Array:
+    """Own axes times standard deviations [m]: A (3, 3, N) with covariance A A^T.
 
-    A zero quaternion is no rotation.
+    Particle axis last, for `core.algebra`. A zero quaternion is no rotation.
     """
     rotations = quaternion_to_matrix(gaussians.quaternions)
-    # Particle axis last: XLA then vectorises over Gaussians.
-    axes = jnp.moveaxis(rotations * scales(gaussians)[:, None, :], 0, -1)
-    return jnp.moveaxis(algebra.matmul_transpose(axes, axes), -1, 0)
+    return jnp.moveaxis(rotations * scales(gaussians)[:, None, :], 0, -1)
+
+
+@jax.jit
+def covariances(gaussians: Gaussians) -> Array:
+    """R S S^T R^T [m^2], shape (N, 3, 3), symmetric to the last bit."""
+    A = axes(gaussians)
+    return jnp.moveaxis(algebra.matmul_transpose(A, A), -1, 0)
 
 
 def opacities(gaussians: Gaussians) -> Array:
