@@ -8,7 +8,7 @@ from jaxphys.render.camera import Camera, orbit
 from jaxphys.scene.scene import View
 
 MARGIN = 0.86  # of the half picture that the motion may fill
-SHARE = 0.995  # of the points that must be in the picture; single grains may fly out
+SHARE = 0.995  # of the points of each frame that must be in the picture; single grains may fly out
 SAMPLES = 3000
 
 
@@ -25,6 +25,12 @@ def _angles(view: View, seconds: float) -> tuple[float, float]:
     return view.azimuth + view.turn * seconds, max(-89.9, min(89.9, elevation))
 
 
+def _middle(frames: list[np.ndarray]) -> np.ndarray:
+    """Middle of the box that holds nearly all points of every frame."""
+    ends = [np.quantile(frame, [1 - SHARE, SHARE], axis=0) for frame in frames]
+    return (np.min([low for low, _ in ends], 0) + np.max([high for _, high in ends], 0)) / 2
+
+
 def frame_cameras(
     view: View, points: list[np.ndarray], fps: float, width: int, height: int
 ) -> list[Camera]:
@@ -37,16 +43,13 @@ def frame_cameras(
         width, height: [pixels].
     """
     # A fixed stride keeps the choice the same for the same motion.
-    sampled = [frame[:: max(1, len(frame) // SAMPLES)] for frame in points]
-    everything = np.concatenate(sampled).astype(np.float64)
+    sampled = [frame[:: max(1, len(frame) // SAMPLES)].astype(np.float64) for frame in points]
     if view.target is None:
-        low, high = np.quantile(everything, [1 - SHARE, SHARE], axis=0)
-        target = (low + high) / 2
-        # A target below the middle of a tall motion would leave the top out; centre the picture.
+        target = _middle(sampled)
+        # The middle of the box need not be the middle of what is seen of it.
         axes = _axes(*_angles(view, 0.0))
-        seen = (everything - target) @ axes.T
-        low, high = np.quantile(seen[:, :2], [1 - SHARE, SHARE], axis=0)
-        target = target + (low + high) / 2 @ axes[:2]
+        seen = [(frame - target) @ axes[:2].T for frame in sampled]
+        target = target + _middle(seen) @ axes[:2]
     else:
         target = np.asarray(view.target)
     tangent = math.tan(math.radians(view.field_of_view) / 2)
@@ -56,8 +59,9 @@ def frame_cameras(
         needed = []
         for i, frame in enumerate(sampled):
             seen = (frame - target) @ _axes(*_angles(view, i / fps)).T
-            needed.append((np.abs(seen[:, :2]) / reach).max(axis=1) - seen[:, 2])
-        distance = max(float(np.quantile(np.concatenate(needed), SHARE)), 1e-3)
+            distances = (np.abs(seen[:, :2]) / reach).max(axis=1) - seen[:, 2]
+            needed.append(np.quantile(distances, SHARE))
+        distance = max(float(max(needed)), 1e-3)
     cameras = []
     for i in range(len(points)):
         azimuth, elevation = _angles(view, i / fps)

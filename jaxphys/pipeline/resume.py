@@ -53,7 +53,7 @@ class Checkpoint:
         """Saves arrays by name; the checkpoint before it goes once the new one is whole."""
         import orbax.checkpoint as ocp
 
-        before = list(self._root.iterdir()) if self._root.is_dir() else []
+        before = list(self._root.glob("*-" + "[0-9]" * 6))
         target = self._path(frame)
         with ocp.StandardCheckpointer() as writer:
             writer.save(target, {k: np.asarray(v) for k, v in arrays.items()}, force=True)

@@ -3,6 +3,7 @@ the plan.
 """
 
 from .boundaries import Box as Box
+from .boundaries import Cut as Cut
 from .boundaries import Impulse as Impulse
 from .boundaries import Plane as Plane
 from .boundaries import Release as Release

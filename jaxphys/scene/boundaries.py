@@ -5,7 +5,7 @@ solver boundaries by `build`.
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
-from jaxphys.scene.check import NON_NEGATIVE, POSITIVE, check_ranges
+from jaxphys.scene.check import NON_NEGATIVE, POSITIVE, between, check_ranges
 
 Vector = tuple[float, float, float]
 Surface = Literal["sticky", "slip", "separate"]
@@ -60,6 +60,7 @@ class Box(_Checked):
         centre, half_size: at `start` [m].
         velocity: of the box and of all that is inside [m/s].
         start, end: acts while start <= time < end [s].
+        rest_after: how long the box's inside is held still after that [s].
     """
 
     type: ClassVar[str] = "box"
@@ -68,6 +69,7 @@ class Box(_Checked):
     velocity: Vector = (0.0, 0.0, 0.0)
     start: float = 0.0
     end: float = FOREVER
+    rest_after: float = field(default=0.0, metadata=NON_NEGATIVE)
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,10 @@ class Impulse(_Checked):
 
     Attributes:
         centre, half_size: of the box, at rest [m].
-        force: on every particle of it [N].
+        force: on all of it together, shared by mass [N].
         start, duration: [s].
+        per_particle: the force is meant for each particle, so that the sum grows with their
+            number.
     """
 
     type: ClassVar[str] = "impulse"
@@ -86,6 +90,7 @@ class Impulse(_Checked):
     force: Vector
     start: float = 0.0
     duration: float = field(default=1e-3, metadata=POSITIVE)
+    per_particle: bool = False
 
 
 @dataclass(frozen=True)
@@ -132,22 +137,40 @@ class Rotate(_Checked):
 
 @dataclass(frozen=True)
 class Release(_Checked):
-    """Particles are held and let go layer by layer, from `begin` to `finish` along an axis.
+    """Particles are held and let go one after another by a plane that sweeps over them.
 
     Attributes:
-        normal: the axis along which layers follow each other, of any length.
-        begin, finish: where the first and the last layer end, along the normal [m].
-        layers: number of layers.
-        start, end: the first layer is let go at `start`, the last at `end` [s].
+        normal: direction in which places are measured, of any length.
+        begin, finish: where the plane is at `start` and at `end`, along the normal [m].
+        start, end: [s].
     """
 
     type: ClassVar[str] = "release"
     normal: Vector
     begin: float
     finish: float
-    layers: int = field(default=50, metadata=POSITIVE)
     start: float = 0.0
     end: float = 1.0
 
 
-Boundary = Walls | Plane | Box | Impulse | Translate | Rotate | Release
+@dataclass(frozen=True)
+class Cut(_Checked):
+    """A half-space that holds what is in it, but for a layer that slides along it, slowed.
+
+    Attributes:
+        point, normal, start, end: as for `Plane`.
+        lower, upper: of the layer along z [m].
+        factor: what is left of the velocity along the plane in the layer.
+    """
+
+    type: ClassVar[str] = "cut"
+    point: Vector
+    normal: Vector
+    lower: float = 0.40
+    upper: float = 0.53
+    factor: float = field(default=0.3, metadata=between(0, 1))
+    start: float = 0.0
+    end: float = FOREVER
+
+
+Boundary = Walls | Plane | Box | Impulse | Translate | Rotate | Release | Cut

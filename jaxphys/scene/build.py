@@ -209,7 +209,7 @@ def build_with_bounds(
         affine=np.concatenate([gradient for _, gradient in motions]),
     )
     volume = jnp.asarray(np.concatenate([part.volumes for part in parts]), jnp.float32)
-    boundaries, rest = solver_boundaries(scene, grid)
+    boundaries, rest = solver_boundaries(scene, grid, positions)
     model = Model(
         mass=density * volume,
         volume=volume,

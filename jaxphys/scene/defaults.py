@@ -19,7 +19,7 @@ def _scene(thing: Object, surface: str, friction: float, **fields) -> Scene:
     return Scene(
         objects=(thing,),
         boundaries=(Plane((*MIDDLE, FLOOR), (0.0, 0.0, 1.0), surface, friction), Walls()),
-        domain=Domain((SIDE, SIDE, 2.0), 1 / 32),
+        domain=Domain((SIDE, SIDE, 2.0), 1 / 24),
         ground=Ground(FLOOR),
         **fields,
     )

@@ -7,6 +7,7 @@ from jaxphys.scene.boundaries import (
     FOREVER,
     Boundary,
     Box,
+    Cut,
     Impulse,
     Plane,
     Release,
@@ -32,22 +33,22 @@ KEYS = {
 
 
 def _cuboid(read: Reader, substep: float, notes: list[str]) -> Box:
-    if read.flag("reset"):
-        notes.append(
-            "cuboid reset: theirs stops the whole grid outside its time span; only the box acts"
-        )
+    resets = read.flag("reset")
+    if resets:
+        notes.append("cuboid reset: theirs then stops the whole grid; here only the box is held")
     return Box(
         read.numbers("point", 3),
         read.numbers("size", 3),
         read.numbers("velocity", 3),
         read.number("start_time", 0.0),
         read.number("end_time", 1e3),
+        15 * substep if resets else 0.0,
     )
 
 
 def _impulse(read: Reader, substep: float, notes: list[str]) -> Impulse:
     notes.append(
-        "particle_impulse: the force acts on every particle, so its effect depends on their masses"
+        "particle_impulse: the force is for each particle, so its effect depends on filling"
     )
     return Impulse(
         read.numbers("point", 3, [1, 1, 1]),
@@ -55,6 +56,7 @@ def _impulse(read: Reader, substep: float, notes: list[str]) -> Impulse:
         read.numbers("force", 3),
         read.number("start_time", 0.0),
         read.whole("num_dt", 1) * substep,
+        per_particle=True,
     )
 
 
@@ -68,38 +70,30 @@ def _translate(read: Reader, substep: float, notes: list[str]) -> Translate:
     )
 
 
-def _plane(read: Reader, substep: float, notes: list[str]) -> Plane:
+def _plane(read: Reader, substep: float, notes: list[str]) -> Plane | Cut:
     surface, friction = read.text("surface", "sticky"), read.number("friction", 0.0)
     if surface == "sticky" and friction != 0:
         raise InputError(
-            f"{read.where}.friction: a sticky surface takes friction 0, found {friction}"
+            f"{read.where}.friction: sticky surfaces take friction 0, found {friction}"
         )
+    point, normal = read.numbers("point", 3), read.numbers("normal", 3)
+    start, end = read.number("start_time", 0.0), read.number("end_time", FOREVER)
     if surface == "cut":
-        notes.append(
-            "surface_collider cut: theirs is a fixed layer 0.4 < z < 0.53; a separating plane here"
-        )
-    elif surface != "sticky":
-        notes.append(
-            f"surface_collider {surface}: theirs sticks whatever it says; it is {surface} here"
-        )
+        notes.append("surface_collider cut: slides along the plane here, along x and z there")
+        return Cut(point, normal, start=start, end=end)
+    if surface != "sticky":
+        notes.append(f"surface_collider {surface}: theirs sticks whatever it says; not so here")
     kind = surface if surface in ("sticky", "slip") else "separate"
-    return Plane(
-        read.numbers("point", 3),
-        read.numbers("normal", 3),
-        kind,
-        friction,
-        read.number("start_time", 0.0),
-        read.number("end_time", FOREVER),
-    )
+    return Plane(point, normal, kind, friction, start, end)
 
 
 def _release(read: Reader, substep: float, notes: list[str]) -> Release:
-    notes.append("release_particles_sequentially: theirs has 50 layers whatever num_layers says")
+    read.whole("num_layers", 50)
+    notes.append("release_particles_sequentially: 50 layers there, one continuous sweep here")
     return Release(
         read.numbers("normal", 3),
         read.number("start_position"),
         read.number("end_position"),
-        read.whole("num_layers", 50),
         read.number("start_time"),
         read.number("end_time"),
     )

@@ -4,11 +4,11 @@ import math
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.state import Config, Model, State
-from jaxphys.mpm.time_step import StepBounds, largest_stable_dt
+from jaxphys.mpm.time_step import StepBounds, largest_stable_dt, validate_dt
 from jaxphys.scene.scene import Scene
 
 # The bounds hold for the initial state; an object that is pressed together gets stiffer.
-SAFETY = 0.6
+SAFETY = 0.75
 MOST_STEPS = 1_000_000
 
 
@@ -22,18 +22,14 @@ def choose_substep(
             message gives the largest safe one.
     """
     bounds = largest_stable_dt(config, model, state)
-    largest = float(bounds.dt)
     frame = scene.seconds_per_frame
-    if not largest > 0 or not math.isfinite(largest):
-        largest = frame
-    wanted = SAFETY * largest
+    wanted = SAFETY * bounds.dt
     if scene.substep is not None:
         wanted = scene.substep
-        if wanted > largest and not scene.unsafe_substep:
-            raise InputError(
-                f"substep: {wanted:.3g} s is unstable; the largest safe one is {largest:.3g} s "
-                f"({bounds.reason}); lower it, or set unsafe_substep"
-            )
+        try:
+            validate_dt(wanted, bounds, unsafe=scene.unsafe_substep)
+        except InputError as error:
+            raise InputError(f"substep: {error}, or set unsafe_substep") from None
     steps = max(1, math.ceil(frame / wanted - 1e-9))
     if steps > MOST_STEPS:
         raise InputError(

@@ -6,6 +6,7 @@ import pytest
 from jaxphys.core.errors import InputError
 from jaxphys.scene import (
     Box,
+    Cut,
     Filling,
     Impulse,
     Object,
@@ -45,6 +46,7 @@ FULL = Scene(
         Translate(UNIT, UNIT),
         Rotate(UNIT, UNIT, 0.1, 0.2),
         Release(UNIT, 0.0, 1.0),
+        Cut(UNIT, UNIT),
     ),
     camera=View(target=UNIT, distance=3.0),
     substep=1e-3,

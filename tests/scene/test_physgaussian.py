@@ -88,7 +88,9 @@ def test_ficus_loads_with_its_meaning_and_notes():
     # One substep's factor applied for a second.
     assert scene.damping == pytest.approx(-math.log(0.9999) / 1e-4)
     assert scene.camera.azimuth == 55 and scene.camera.turn == pytest.approx(0.5 / 0.04)
+    assert scene.boundaries[0].rest_after == pytest.approx(15e-4)
     assert scene.boundaries[1].duration == pytest.approx(1e-4)
+    assert scene.boundaries[1].per_particle
     text = "\n".join(notes)
     for word in ("cuboid reset", "particle_impulse", "particle_filling", "init_radius", "bounds"):
         assert word in text
@@ -100,12 +102,18 @@ def test_every_boundary_type(condition, kind):
     assert isinstance(loaded.scene.boundaries[0], kind)
 
 
-def test_surface_and_layers_are_honoured_not_copied():
+def test_cut_has_the_layer_that_their_code_fixes():
+    condition = ALL[4][0] | {"surface": "cut"}
+    found = from_physgaussian({"g": [0, 0, 0], "boundary_conditions": [condition]}).scene
+    assert (found.boundaries[0].lower, found.boundaries[0].upper) == (0.40, 0.53)
+
+
+def test_surfaces_are_honoured_not_copied():
     slip = from_physgaussian({"g": [0, 0, 0], "boundary_conditions": [ALL[4][0]]})
     assert slip.scene.boundaries[0].surface == "slip"
     assert any("sticks whatever" in note for note in slip.notes)
     release = from_physgaussian({"g": [0, 0, 0], "boundary_conditions": [ALL[5][0]]})
-    assert release.scene.boundaries[0].layers == 20
+    assert release.scene.boundaries[0].begin == 1.5
     assert any("50 layers" in note for note in release.notes)
 
 

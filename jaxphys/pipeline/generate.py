@@ -1,0 +1,98 @@
+"""A sentence in, a directory with a moving object out."""
+
+import dataclasses
+import os
+from pathlib import Path
+
+from jaxphys.core.errors import InputError
+from jaxphys.core.files import write_json
+from jaxphys.gaussians.gaussians import Gaussians
+from jaxphys.gaussians.ply import read_ply, write_ply
+from jaxphys.guidance.refine import Refinement, check_prompt, refine
+from jaxphys.pipeline.animate import Watch, animate
+from jaxphys.pipeline.output import Timing, run_directory
+from jaxphys.pipeline.resume import FOLDER, fingerprint
+from jaxphys.scene.build import validate
+from jaxphys.scene.scene import Generation, Scene
+
+
+def _asked(
+    prompt: str | None, scene: Scene, steps: int | None, splats: int | None
+) -> tuple[Scene, Generation]:
+    """The scene with what is asked for written into it, and that part of it."""
+    known = scene.generation
+    if prompt is None and known is None:
+        raise InputError("prompt: is missing; say what the object is, for example 'a strawberry'")
+    given = {"prompt": prompt, "steps": steps, "splats": splats}
+    given = {name: value for name, value in given.items() if value is not None}
+    try:
+        generation = dataclasses.replace(known or Generation(prompt or ""), **given)
+    except InputError as error:
+        raise InputError(f"--{error}") from None
+    check_prompt(generation.prompt)
+    return dataclasses.replace(scene, generation=generation), generation
+
+
+def generate(
+    prompt: str | None,
+    scene: Scene,
+    out: str | os.PathLike,
+    *,
+    steps: int | None = None,
+    splats: int | None = None,
+    save_splats: bool = False,
+    progress: bool = False,
+    watch: Watch | None = None,
+) -> Path:
+    """Makes an object from a sentence and moves it; returns the directory.
+
+    Besides what `animate` writes, the directory gets `prompt.json` (original, refined, how).
+
+    Args:
+        prompt: the sentence; None takes the one in the scene.
+        scene: whose first object the sentence describes.
+        out: the directory, made if missing.
+        steps: of optimisation; None is the default of `text_to_gaussians`.
+        splats: number of Gaussians at most; None likewise.
+        save_splats, progress, watch: as for `animate`.
+
+    Raises:
+        InputError, SimulationError, KeyboardInterrupt: as `animate`; or an unusable prompt.
+    """
+    timing = Timing()
+    scene, generation = _asked(prompt, scene, steps, splats)
+    validate(scene)
+    refinement = refine(generation.prompt)
+    out = run_directory(out)
+    write_json(out / "prompt.json", dataclasses.asdict(refinement))
+    with timing.stage("generate"):
+        gaussians = _gaussians(refinement, scene, generation, out, progress)
+    return animate(
+        scene,
+        out,
+        objects=(gaussians,),
+        save_splats=save_splats,
+        progress=progress,
+        timing=timing,
+        watch=watch,
+    )
+
+
+def _gaussians(
+    refinement: Refinement, scene: Scene, generation: Generation, out: Path, progress: bool
+) -> Gaussians:
+    """The object: kept from an interrupted run of the same request, or made."""
+    asked = (refinement.refined, generation.steps, generation.splats, scene.seed)
+    kept = out / FOLDER / f"object-{fingerprint(repr(asked).encode())[:16]}.ply"
+    if not kept.exists():
+        from jaxphys.guidance.optimise import text_to_gaussians
+
+        gaussians = text_to_gaussians(
+            refinement.refined,
+            seed=scene.seed,
+            steps=generation.steps,
+            count=generation.splats,
+            progress=progress,
+        )
+        write_ply(kept, gaussians)
+    return read_ply(kept)
