@@ -14,13 +14,14 @@ from jax import Array
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.colour import ColourRange, colour_range, to_unit_interval
+from jaxphys.gaussians.filling import particle_volumes
 from jaxphys.gaussians.gaussians import Gaussians, concatenate
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.materials import assemble_parameters, get_material, material_values
 from jaxphys.mpm.sorting import cell_order, inverse_order
 from jaxphys.mpm.state import Config, Model, State, initial_state
 from jaxphys.mpm.time_step import StepBounds
-from jaxphys.scene.place import Placed, particle_volumes, place
+from jaxphys.scene.place import Placed, place
 from jaxphys.scene.scene import Object, Scene
 from jaxphys.scene.solver_boundaries import solver_boundaries
 from jaxphys.scene.substep import choose_substep
@@ -94,14 +95,10 @@ class Part:
         count = placed.moving.count
         points = np.concatenate([np.asarray(placed.moving.means), placed.filling])
         order = cell_order(points, grid)
-        per_cell = 1
-        if thing.filling is not None:
-            spacing = thing.filling.spacing or grid.spacing / 2
-            per_cell = max(1, round(thing.filling.per_cell * (grid.spacing / spacing) ** 3))
         self.thing, self.where = thing, where
         self.positions = points[order]
         self.carriers = inverse_order(order)[:count]
-        self.volumes = particle_volumes(self.positions, grid, per_cell)
+        self.volumes = particle_volumes(self.positions, grid.spacing)
 
     def motion(self) -> tuple[np.ndarray, np.ndarray]:
         """Initial velocity (N, 3) and its gradient (N, 3, 3) from `velocity` and `spin`."""
@@ -189,7 +186,7 @@ def build_with_bounds(
                 f"build: {len(objects)} sets of Gaussians for {len(scene.objects)} objects"
             )
         placed = tuple(
-            place(gaussians, thing, grid, f"objects[{i}]", seed=scene.seed + i)
+            place(gaussians, thing, grid, f"objects[{i}]", scene.seed + i)
             for i, (gaussians, thing) in enumerate(zip(objects, scene.objects, strict=True))
         )
     parts = [

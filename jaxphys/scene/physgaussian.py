@@ -146,8 +146,8 @@ def _filling(
     return Filling(
         spacing=side / read.whole("n_grid", 4 * cells),
         density_threshold=read.number("density_threshold", 5.0),
-        search_threshold=math.ceil(read.number("search_threshold", 3.0)),
-        search_exclude_direction=read.whole("search_exclude_direction", 5),
+        search_threshold=read.number("search_threshold", 3.0),
+        exclude_direction=read.whole("search_exclude_direction", 5),
         ray_direction=read.whole("ray_cast_direction", 4),
         per_cell=read.whole(per_cell, 1),
         maximum=read.whole("max_particles_num", 2_000_000),

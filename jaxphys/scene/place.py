@@ -8,6 +8,7 @@ import numpy as np
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.rotations import axis_angle_to_matrix
+from jaxphys.gaussians.filling import FillingConfig, fill_interior
 from jaxphys.gaussians.gaussians import Gaussians, opacities, select, transform
 from jaxphys.mpm.grid import Grid
 from jaxphys.scene.scene import Object
@@ -39,8 +40,8 @@ def rotation_matrix(thing: Object, where: str) -> np.ndarray:
     return total
 
 
-def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str) -> Placed:
-    """The Gaussians of an object in the domain, without filling.
+def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str, seed: int) -> Placed:
+    """The Gaussians of an object in the domain, and its filling; `seed` is for the latter.
 
     Raises:
         InputError: nothing is opaque enough or inside `area`, or the object sticks out of the
@@ -70,7 +71,8 @@ def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str) -> Placed
     placed = transform(gaussians, scale=scale, translation=shift)
     moving = select(placed, np.flatnonzero(chosen))
     _require_inside(np.asarray(moving.means), grid, where)
-    return Placed(moving, select(placed, np.flatnonzero(~chosen)), np.zeros((0, 3), np.float32))
+    still = select(placed, np.flatnonzero(~chosen))
+    return Placed(moving, still, _fill(moving, thing, grid, seed, where))
 
 
 def _numbers(values) -> str:
@@ -89,14 +91,26 @@ def _require_inside(points: np.ndarray, grid: Grid, where: str) -> None:
         )
 
 
-def particle_volumes(points: np.ndarray, grid: Grid, per_cell: int) -> np.ndarray:
-    """Rest volume of each particle [m^3], shape (N,).
-
-    The particles of a grid cell share it, as in PhysGaussian. A cell with fewer particles than
-    `per_cell`, the number where an object is filled, counts as partly empty: it lies on the
-    surface.
-    """
-    cells = np.floor(points / grid.spacing).astype(np.int64)
-    keys = (cells[:, 0] * grid.shape[1] + cells[:, 1]) * grid.shape[2] + cells[:, 2]
-    _, inverse, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    return grid.spacing**3 / np.maximum(counts[inverse], per_cell)
+def _fill(moving: Gaussians, thing: Object, grid: Grid, seed: int, where: str) -> np.ndarray:
+    """Further particles inside an object (M, 3) [m], none where it stays hollow."""
+    filling = thing.filling
+    if filling is None:
+        return np.zeros((0, 3), np.float32)
+    config = FillingConfig(
+        spacing=filling.spacing or grid.spacing / 2,
+        density_threshold=filling.density_threshold,
+        search_threshold=filling.search_threshold,
+        search_count=filling.search_count,
+        exclude_direction=filling.exclude_direction,
+        ray_direction=filling.ray_direction,
+        per_cell=filling.per_cell,
+        maximum=filling.maximum,
+        area=filling.area,
+        smooth=filling.smooth,
+    )
+    try:
+        points = fill_interior(moving, config, seed)
+    except InputError as error:
+        raise InputError(f"{where}.filling: {error}") from None
+    low, high = grid.lower, np.array(grid.upper)
+    return points[np.all((points > low) & (points < high), axis=1)]

@@ -78,7 +78,7 @@ def _parts(scene: Scene, simulation: Simulation) -> tuple[dict[str, str], dict[s
         (included if wanted else left_out)[name] = why if wanted else why_not
 
     plastic = any(law.plastic for law in laws)
-    spectral = any(law.name != "fixed_corotated" and law.name != "neo_hookean" for law in laws)
+    spectral = any(law.name != "neo-Hookean" for law in laws)
     decide("return map", plastic, "a law is plastic", "no law is plastic")
     decide("eigen-decomposition", spectral, "a law works on principal strains", "no law needs one")
     decide(

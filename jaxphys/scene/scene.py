@@ -47,14 +47,15 @@ class Region(_Checked):
 
 @dataclass(frozen=True)
 class Filling(_Checked):
-    """Particles inside a hollow object. A field left `null` follows from the grid.
+    """Particles inside a hollow object (see `jaxphys.gaussians.filling`).
 
     Attributes:
         spacing: of the cells that are searched [m]; null: half the grid's spacing.
         density_threshold: summed opacity above which a cell counts as solid.
-        search_threshold: how many of the six directions must meet solid cells for a cell to be
-            inside.
-        search_exclude_direction, ray_direction: 0 to 5 for +x, -x, +y, -y, +z, -z; -1 for none.
+        search_threshold: density that a ray must meet to have hit something; null: as above.
+        search_count: how many of the six directions must hit for a cell to be inside.
+        exclude_direction, ray_direction: 0 to 5 for +x, -x, +y, -y, +z, -z; -1 for none. The first
+            is not searched; along the second, solid parts must be crossed an odd number of times.
         per_cell: particles for every cell inside.
         maximum: largest number of particles to add.
         area: (x0, x1, y0, y1, z0, z1) in the domain [m]; null: everywhere.
@@ -63,12 +64,13 @@ class Filling(_Checked):
     """
 
     spacing: float | None = field(default=None, metadata=POSITIVE)
-    density_threshold: float = field(default=0.5, metadata=NON_NEGATIVE)
-    search_threshold: int = field(default=5, metadata=between(0, 6))
-    search_exclude_direction: int = field(default=-1, metadata=between(-1, 5))
+    density_threshold: float = field(default=1.0, metadata=NON_NEGATIVE)
+    search_threshold: float | None = field(default=None, metadata=NON_NEGATIVE)
+    search_count: int = field(default=6, metadata=between(0, 6))
+    exclude_direction: int = field(default=-1, metadata=between(-1, 5))
     ray_direction: int = field(default=-1, metadata=between(-1, 5))
     per_cell: int = field(default=1, metadata=POSITIVE)
-    maximum: int = field(default=200_000, metadata=POSITIVE)
+    maximum: int = field(default=500_000, metadata=POSITIVE)
     area: Area | None = None
     smooth: bool = False
     relax: bool = True

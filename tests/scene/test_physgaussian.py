@@ -83,7 +83,7 @@ def test_ficus_loads_with_its_meaning_and_notes():
     assert thing.regions[0].parameters["density"] == 70
     assert [turn.axis for turn in thing.rotation] == [(1, 0, 0), (0, 0, 1)]
     assert thing.filling.spacing == pytest.approx(2 / 128) and thing.filling.per_cell == 4
-    assert thing.filling.search_threshold == 1
+    assert thing.filling.search_threshold == 0.5
     assert (scene.frames, scene.fps, scene.frame_time) == (125, 25, 0.04)
     # One substep's factor applied for a second.
     assert scene.damping == pytest.approx(-math.log(0.9999) / 1e-4)
