@@ -106,7 +106,7 @@ def largest_stable_dt(config, model, state, safety: float = SAFETY) -> StepBound
         InputError: no bound is positive and finite, since the state is not finite.
     """
     spacing = config.grid.spacing
-    bounds = dict(zip(("sound", "isolated"), (math.inf, math.inf), strict=True))
+    bounds = {"sound": math.inf, "isolated": math.inf}
     density = model.mass / model.volume
     for law, start, stop in config.segments:
         parameters = {name: model.parameters[name][start:stop] for name in law.parameters}
