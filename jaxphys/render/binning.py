@@ -2,7 +2,7 @@
 
 Splats are sorted by depth once. Each then emits one pair (tile, depth rank) for every tile of its
 box, so that pairs lie in depth order, into an array of `capacity` slots; sorting the single integer
-`tile << bits | rank` gives every tile a contiguous run in depth order. All of it is exact: depths
+`tile * N + rank` gives every tile a contiguous run in depth order. All of it is exact: depths
 are compared with all their bits and no list is cut short, unless the capacity is too small, which
 is reported and leaves out the farthest pairs.
 """
@@ -133,8 +133,8 @@ def tile_lists(
 ) -> TileLists:
     """Emits the pairs into `capacity` slots, drops those whose ellipse misses the tile, and sorts.
 
-    One uint32 holds tile and rank where their bits suffice; otherwise tiles are sorted stably with
-    the rank as payload, which gives the same lists since pairs are emitted in depth order.
+    One uint32 holds tile and rank where (tiles + 1) N <= 2^32; otherwise tiles are sorted stably
+    with the rank as payload, which gives the same lists since pairs are emitted in depth order.
     """
     count = boxes.order.shape[0]
     slots = jnp.arange(capacity, dtype=jnp.int32)
@@ -147,15 +147,12 @@ def tile_lists(
     kept = (slots < boxes.required) & _meets(projected, boxes, owners, column, row, grid, settings)
     tiles = jnp.where(kept, row * grid.columns + column, grid.tiles)
 
-    rank_bits = max(count - 1, 0).bit_length()
     boundaries = jnp.arange(grid.tiles + 1)
-    if grid.tiles.bit_length() + rank_bits <= 32:
-        keys = (tiles.astype(jnp.uint32) << rank_bits) | jnp.where(kept, owners, 0).astype(
-            jnp.uint32
-        )
+    if (grid.tiles + 1) * count <= 2**32:
+        keys = tiles.astype(jnp.uint32) * jnp.uint32(count) + owners.astype(jnp.uint32)
         keys = jnp.sort(keys)
-        offsets = jnp.searchsorted(keys, boundaries.astype(jnp.uint32) << rank_bits)
-        ranks = (keys & jnp.uint32(2**rank_bits - 1)).astype(jnp.int32)
+        offsets = jnp.searchsorted(keys, boundaries.astype(jnp.uint32) * jnp.uint32(count))
+        ranks = (keys % jnp.uint32(count)).astype(jnp.int32)
     else:
         keys, ranks = lax.sort((tiles, owners), num_keys=1, is_stable=True)
         offsets = jnp.searchsorted(keys, boundaries.astype(jnp.int32))

@@ -27,7 +27,9 @@ from .settings import Settings
 
 HIGHEST = lax.Precision.HIGHEST
 # Elements of one chunk of a group, such that its few arrays stay in a core's cache.
-GROUP_ELEMENTS = 2**17
+GROUP_ELEMENTS = 2**16
+# How many slots are added at once when the gradient of a splat is gathered.
+FOLD = 8
 
 
 class Work(NamedTuple):
@@ -59,33 +61,39 @@ def _forward(geometry, features, boxes, lists, grid, settings):
     table = jnp.concatenate([geometry, features]).T[boxes.order]
     work = _schedule(lists, grid, settings)
     pixels = grid.tile_size**2
+    channels = features.shape[0]
 
-    def finish_group(group: Work) -> Array:
+    def finish_group(carry):
+        index, blended = carry
+        group = jax.tree.map(lambda leaf: leaf[index], work)
         size = group.tiles.shape[0]
         x, y = _pixels(group.tiles, grid, table.dtype)
 
         def advance(carry):
             done, light, total, _ = carry
             rows, _ = _chunk(table, lists, group, done, settings)
-            alpha = _alpha(rows, x, y, settings)[1]
-            before, light = _transmittances(alpha, light)
+            alpha = lax.optimization_barrier(_alpha(rows, x, y, settings)[1])
+            before, light = lax.optimization_barrier(_transmittances(alpha, light))
             weights = _weights(alpha, before, settings)
             total = total + _features_sum(weights, rows[..., 6:])
             return done + 1, light, total, _alive(light, group, done + 1, settings)
 
         light = jnp.ones((size, pixels), table.dtype)
-        total = jnp.zeros((size, features.shape[0], pixels), table.dtype)
+        total = jnp.zeros((size, channels, pixels), table.dtype)
         start = (jnp.int32(0), light, total, jnp.any(group.lengths > 0))
-        return lax.while_loop(lambda carry: carry[3], advance, start)[2]
+        total = lax.while_loop(lambda carry: carry[3], advance, start)[2]
+        where = jnp.where(group.tiles < 0, grid.tiles + jnp.arange(size), group.tiles)
+        return index + 1, blended.at[where].set(total, mode="drop", unique_indices=True)
 
-    blended = _over_groups(finish_group, work, settings)
-    blended = blended.reshape(-1, *blended.shape[2:])
-    place = jnp.zeros(grid.tiles, jnp.int32)
-    flat = work.tiles.reshape(-1)
-    place = place.at[jnp.where(flat < 0, grid.tiles, flat)].set(
-        jnp.arange(flat.shape[0], dtype=jnp.int32), mode="drop", unique_indices=True
-    )
-    return blended[place], (table, work)
+    blank = jnp.zeros((grid.tiles, channels, pixels), table.dtype)
+    busy = _busy_groups(work)
+    blended = lax.while_loop(lambda c: c[0] < busy, finish_group, (jnp.int32(0), blank))[1]
+    return blended, (table, work)
+
+
+def _busy_groups(work: Work) -> Array:
+    """Groups that have anything to draw; by the order of tiles these come first."""
+    return jnp.sum(jnp.any(work.lengths > 0, axis=1), dtype=jnp.int32)
 
 
 def _blend_forward(geometry, features, boxes, lists, grid, settings):
@@ -103,8 +111,9 @@ def _blend_backward(grid, settings, residuals, cotangent):
     behind_all = jnp.sum(total * cotangent, axis=1)
     moments_of = _monomials(grid, dtype)
 
-    def finish_group(carry, group: Work):
-        slots = carry
+    def finish_group(carry):
+        index, slots = carry
+        group = jax.tree.map(lambda leaf: leaf[index], work)
         size = group.tiles.shape[0]
         x, y = _pixels(group.tiles, grid, dtype)
         safe = jnp.maximum(group.tiles, 0)
@@ -114,10 +123,11 @@ def _blend_backward(grid, settings, residuals, cotangent):
             done, light, behind, _, slots = carry
             rows, ranks = _chunk(table, lists, group, done, settings)
             raw, alpha = _alpha(rows, x, y, settings)
-            before, light = _transmittances(alpha, light)
+            raw, alpha = lax.optimization_barrier((raw, alpha))
+            before, light = lax.optimization_barrier(_transmittances(alpha, light))
             weights = _weights(alpha, before, settings)
-            value = _feature_dot(rows[..., 6:], g)
-            after, behind = _remainders(weights * value, behind)
+            value = lax.optimization_barrier(_feature_dot(rows[..., 6:], g))
+            after, behind = lax.optimization_barrier(_remainders(weights * value, behind))
             slope = jnp.where(weights > 0, before * value - after / (1 - alpha), 0)
             if not settings.gradient_through_clamp:
                 slope = jnp.where(raw < settings.alpha_max, slope, 0)
@@ -139,10 +149,12 @@ def _blend_backward(grid, settings, residuals, cotangent):
 
         light = jnp.ones((size, pixels), dtype)
         start = (jnp.int32(0), light, behind_all[safe], jnp.any(group.lengths > 0), slots)
-        return lax.while_loop(lambda carry: carry[3], advance, start)[4], None
+        return index + 1, lax.while_loop(lambda carry: carry[3], advance, start)[4]
 
-    slots, _ = lax.scan(finish_group, jnp.zeros((capacity, width), dtype), work)
-    by_rank = _sum_runs(slots, boxes)
+    blank = jnp.zeros((capacity, width), dtype)
+    busy = _busy_groups(work)
+    slots = lax.while_loop(lambda c: c[0] < busy, finish_group, (jnp.int32(0), blank))[1]
+    by_rank = _sum_runs(slots, boxes, grid)
     count = boxes.order.shape[0]
     rank_of = (
         jnp.zeros(count, jnp.int32)
@@ -177,21 +189,6 @@ def _schedule(lists: TileLists, grid: Grid, settings: Settings) -> Work:
     return Work(
         grouped(tiles, -1), grouped(lists.offsets[:-1][tiles], 0), grouped(lengths[tiles], 0)
     )
-
-
-def _over_groups(function, work: Work, settings: Settings) -> Array:
-    """Maps over groups in independent interleaved loops, which XLA may run at the same time."""
-    groups = work.tiles.shape[0]
-    strands = min(settings.strands, groups)
-    parts = [
-        lax.map(function, jax.tree.map(lambda leaf, s=s: leaf[s::strands], work))
-        for s in range(strands)
-    ]
-    if strands == 1:
-        return parts[0]
-    order = [g for s in range(strands) for g in range(s, groups, strands)]
-    inverse = sorted(range(groups), key=order.__getitem__)
-    return jnp.concatenate(parts)[jnp.array(inverse)]
 
 
 def _pixels(tiles: Array, grid: Grid, dtype) -> tuple[Array, Array]:
@@ -318,11 +315,11 @@ def _emission_slots(boxes: Boxes, ranks: Array, group: Work, grid: Grid, capacit
     return jnp.where(ranks >= 0, slot, beyond)
 
 
-def _sum_runs(slots: Array, boxes: Boxes) -> Array:
+def _sum_runs(slots: Array, boxes: Boxes, grid: Grid) -> Array:
     """Sums the contiguous slots of each splat: (capacity, K) -> (N, K).
 
-    Neighbours at distance 1, 2, 4, ... inside a run are added in turn, until the longest run has
-    collapsed onto its first slot: a tree of fixed shape, whatever the device.
+    Eight neighbours at distance 1, 8, 64, ... inside a run are added in turn, until the longest run
+    has collapsed onto its first slot: a tree of fixed shape, whatever the device.
     """
     capacity = slots.shape[0]
     owners = slot_owners(boxes, capacity)
@@ -331,13 +328,16 @@ def _sum_runs(slots: Array, boxes: Boxes) -> Array:
 
     def fold(carry):
         distance, slots = carry
-        shifted = lax.dynamic_slice_in_dim(
-            jnp.concatenate([slots, jnp.zeros_like(slots)]), distance, capacity
-        )
-        takes = (local % (2 * distance) == 0) & (local + distance < counts)
-        return 2 * distance, slots + jnp.where(takes[:, None], shifted, 0)
+        summed = slots[:capacity]
+        for k in range(1, FOLD):
+            shifted = lax.dynamic_slice_in_dim(slots, k * distance, capacity)
+            takes = (local % (FOLD * distance) == 0) & (local + k * distance < counts)
+            summed = summed + jnp.where(takes[:, None], shifted, 0)
+        return FOLD * distance, lax.dynamic_update_slice_in_dim(slots, summed, 0, 0)
 
     longest = jnp.max(boxes.counts)
+    # Room for the largest distance within a run; a slice that starts beyond takes part in nothing.
+    slots = jnp.pad(slots, ((0, 1 << grid.tiles.bit_length()), (0, 0)))
     _, slots = lax.while_loop(lambda carry: carry[0] < longest, fold, (jnp.int32(1), slots))
     first = jnp.minimum(boxes.starts, capacity - 1)
     drawn = (boxes.counts > 0) & (boxes.starts < capacity)

@@ -33,12 +33,11 @@ class Settings:
             half field of view about the optical axis (Kerbl et al. 2023), "none".
         gradient_through_clamp: pass the gradient of alpha through the clamp at `alpha_max`, as
             Kerbl et al. 2023 do; the true derivative there is zero, which is the default.
-        chunk_size, group_size, strands: how the blending loop is cut up: so many splats of a tile
-            at a time, for so many tiles at a time, in so many independent loops that run
-            concurrently. `group_size` None takes a size that suits the tile. Speed only.
+        chunk_size, group_size: how the blending loop is cut up: so many splats of a tile at a time,
+            for so many tiles at a time. `group_size` None takes what suits the tile. Speed only.
     """
 
-    tile_size: int = 16
+    tile_size: int = 8
     near: float = 0.01
     far: float = 1e10
     low_pass: float = 0.3
@@ -51,7 +50,6 @@ class Settings:
     gradient_through_clamp: bool = False
     chunk_size: int = 8
     group_size: int | None = None
-    strands: int = 2
 
     def __post_init__(self):
         def require(holds: bool, field: str, remedy: str) -> None:
@@ -75,8 +73,7 @@ class Settings:
             0 < self.alpha_min < self.alpha_max, "alpha_min", "must lie between 0 and alpha_max"
         )
         require(0 <= self.transmittance_min < 1, "transmittance_min", "must lie in [0, 1)")
-        for field in ("chunk_size", "strands"):
-            require(getattr(self, field) >= 1, field, "must be at least 1")
+        require(self.chunk_size >= 1, "chunk_size", "must be at least 1")
         require(self.group_size is None or self.group_size >= 1, "group_size", "must be at least 1")
 
     @classmethod
