@@ -1,1 +1,27 @@
+"""MLS-MPM: laws, materials, boundaries, the step, rollouts and their gradients."""
 
+from .adjoint import Checkpointed as Checkpointed
+from .adjoint import Plain as Plain
+from .boundaries import GridBoundary as GridBoundary
+from .fracture import number_of_pieces as number_of_pieces
+from .grid import Grid as Grid
+from .law import Law as Law
+from .materials import MATERIALS as MATERIALS
+from .materials import Material as Material
+from .materials import get_material as get_material
+from .particle_boundaries import ParticleBoundary as ParticleBoundary
+from .rollout import Frames as Frames
+from .rollout import SimulationError as SimulationError
+from .rollout import check as check
+from .rollout import frame_step as frame_step
+from .rollout import rollout_frames as rollout_frames
+from .sorting import cell_order as cell_order
+from .sorting import inverse_order as inverse_order
+from .state import Config as Config
+from .state import Model as Model
+from .state import State as State
+from .state import Status as Status
+from .state import initial_state as initial_state
+from .time_step import StepBounds as StepBounds
+from .time_step import largest_stable_dt as largest_stable_dt
+from .time_step import validate_dt as validate_dt

@@ -1,0 +1,100 @@
+"""MLS-MPM throughput: a block of random particles, eight per cell, in a fixed grid.
+
+Plain functions: they build the case and return something to time. Our side and the peer in
+`benchmarks/peers/taichi_mpm.py` get the same particles in the same (sorted) order.
+"""
+
+from functools import partial
+
+import numpy as np
+
+LAWS = ("neo-Hookean", "fixed corotated")
+
+
+def block_case(cells: int, nodes: int, law: str = "neo-Hookean", seed: int = 0) -> dict:
+    """A block of `cells`^3 cells with 8 particles each on average, sorted by cell, on `nodes`^3.
+
+    Usual sizes: (20, 64), 64k particles, and (32, 128), 262k. The domain is 1 m wide, the material
+    at half its largest stable step. Positions (N, 3) [m] and velocities (N, 3) [m/s] are numpy.
+    """
+    from jaxphys.mpm.grid import Grid
+    from jaxphys.mpm.sorting import cell_order
+
+    random = np.random.default_rng(seed)
+    spacing, count = 1.0 / nodes, 8 * cells**3
+    start = nodes / 2 - cells / 2
+    position = spacing * (start + cells * random.random((count, 3)))
+    position = position[cell_order(position, Grid((nodes,) * 3, spacing))]
+    density, E, nu = 1000.0, 1e5, 0.3
+    sound = (E * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / density) ** 0.5
+    return {
+        "position": position,
+        "velocity": 0.1 * random.normal(size=(count, 3)),
+        "nodes": nodes,
+        "spacing": spacing,
+        "law": law,
+        "mass": density * spacing**3 / 8,
+        "volume": spacing**3 / 8,
+        "youngs_modulus": E,
+        "poisson_ratio": nu,
+        "dt": 0.5 * 0.7 * spacing / sound,
+    }
+
+
+def model_and_state(case: dict, window: int | None = None):
+    """(config, model, state) of a `block_case` in float32; window: nodes per axis, None for all."""
+    import jax.numpy as jnp
+
+    from jaxphys.mpm.elasticity import FIXED_COROTATED, NEO_HOOKEAN
+    from jaxphys.mpm.grid import Grid
+    from jaxphys.mpm.state import Config, Model, initial_state
+
+    count = len(case["position"])
+    law = dict(zip(LAWS, (NEO_HOOKEAN, FIXED_COROTATED), strict=True))[case["law"]]
+    grid = Grid((case["nodes"],) * 3, case["spacing"])
+    config = Config(grid, ((law, 0, count),), window=None if window is None else (window,) * 3)
+
+    def full(name):
+        return jnp.full(count, case[name], jnp.float32)
+
+    model = Model(
+        mass=full("mass"),
+        volume=full("volume"),
+        parameters={name: full(name) for name in ("youngs_modulus", "poisson_ratio")},
+        gravity=jnp.array([0.0, 0.0, -9.8], jnp.float32),
+    )
+    state = initial_state(config, case["position"], case["velocity"], dtype=jnp.float32)
+    return config, model, state
+
+
+def forward(case: dict, steps: int, window: int | None = None):
+    """A compiled `() -> State` that runs `steps` steps from the case's start."""
+    import jax
+
+    from jaxphys.mpm.rollout import rollout
+
+    config, model, state = model_and_state(case, window)
+    run = jax.jit(partial(rollout, config, dt=case["dt"], steps=steps))
+    return partial(run, model, state)
+
+
+def value_and_gradient(case: dict, steps: int, adjoint=None, window: int | None = None):
+    """A compiled `() -> (value, gradient)` of the mean square position by Young's modulus."""
+    import jax
+    import jax.numpy as jnp
+
+    from jaxphys.mpm.adjoint import Checkpointed
+    from jaxphys.mpm.rollout import rollout
+
+    config, model, state = model_and_state(case, window)
+
+    def loss(modulus, model, state):
+        parameters = {**model.parameters, "youngs_modulus": modulus}
+        changed = type(model)(model.mass, model.volume, parameters, model.gravity)
+        end = rollout(
+            config, changed, state, dt=case["dt"], steps=steps, adjoint=adjoint or Checkpointed()
+        )
+        return jnp.mean(end.position**2)
+
+    run = jax.jit(jax.value_and_grad(loss))
+    return partial(run, model.parameters["youngs_modulus"], model, state)

@@ -1,0 +1,54 @@
+"""The background grid: nodes at multiples of a spacing, from the origin."""
+
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.core.errors import InputError
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A regular grid whose node (i, j, k) sits at `spacing * (i, j, k)`.
+
+    shape: nodes per axis, each at least 3 (a quadratic B-spline touches three).
+    spacing: distance between neighbouring nodes [m], positive.
+    Particles must stay where their three nodes per axis exist:
+    `0.5 <= x / spacing < shape - 1.5`.
+    """
+
+    shape: tuple[int, int, int]
+    spacing: float
+
+    def __post_init__(self):
+        if len(self.shape) != 3 or min(self.shape) < 3:
+            raise InputError(
+                f"Grid.shape is {self.shape}: give three node counts, each at least 3."
+            )
+        if not 0 < self.spacing < float("inf"):
+            raise InputError(f"Grid.spacing is {self.spacing}: give a positive length in metres.")
+
+    @property
+    def lower(self) -> float:
+        """Least coordinate a particle may have on any axis [m]."""
+        return 0.5 * self.spacing
+
+    @property
+    def upper(self) -> tuple[float, float, float]:
+        """Coordinates that particles must stay below, per axis [m]."""
+        return tuple((n - 1.5) * self.spacing for n in self.shape)
+
+
+def node_coordinates(
+    shape: tuple[int, int, int], spacing: float, origin: Array, dtype
+) -> tuple[Array, Array, Array]:
+    """Node coordinates [m] of a window of `shape` nodes that starts at node `origin` (3,) int.
+
+    Three arrays of shapes (nx, 1, 1), (1, ny, 1), (1, 1, nz), which broadcast over the window.
+    """
+    coordinates = []
+    for axis, count in enumerate(shape):
+        line = (jnp.arange(count) + origin[axis]).astype(dtype) * spacing
+        coordinates.append(line.reshape([-1 if a == axis else 1 for a in range(3)]))
+    return tuple(coordinates)

@@ -1,0 +1,184 @@
+"""What a simulation is made of: `Config` the program, `Model` the numbers, `State` the motion."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.core.errors import InputError
+
+from .grid import Grid
+
+OK, NOT_FINITE, LEFT_GRID, STEP_TOO_LARGE, LEFT_WINDOW = range(5)
+
+
+@dataclass(frozen=True)
+class Config:
+    """What decides which program is compiled. Hashable.
+
+    grid: the background grid.
+    segments: (law, start, stop) for contiguous runs of particles, from 0 to N without gaps.
+    track_total: keep the total deformation gradient beside the elastic one. Has an effect only
+        where a law is plastic; elsewhere the two are the same.
+    window: nodes per axis of the part of the grid that is computed, or None for all of it. The
+        window follows the particles; if they outgrow it, the status says so. A block of particles
+        that spans c cells needs c + 3 nodes, and room for what its motion adds.
+    """
+
+    grid: Grid
+    segments: tuple[tuple[object, int, int], ...]
+    track_total: bool = False
+    window: tuple[int, int, int] | None = None
+
+    def __post_init__(self):
+        reached = 0
+        for law, start, stop in self.segments:
+            if start != reached or stop <= start:
+                raise InputError(
+                    f"Config.segments: '{law.name}' covers particles {start} to {stop}, but must "
+                    f"start at {reached} and hold at least one; order segments without gaps."
+                )
+            reached = stop
+        if not reached:
+            raise InputError("Config.segments is empty: give at least one (law, start, stop).")
+        if self.window is not None and not all(
+            3 <= w <= n for w, n in zip(self.window, self.grid.shape, strict=True)
+        ):
+            raise InputError(
+                f"Config.window is {self.window}: it must lie between 3 nodes and the grid's "
+                f"{self.grid.shape} on each axis."
+            )
+
+    @property
+    def particles(self) -> int:
+        """Number of particles."""
+        return self.segments[-1][2]
+
+    @property
+    def nodes(self) -> tuple[int, int, int]:
+        """Shape of the part of the grid that is computed."""
+        return self.window or self.grid.shape
+
+    @property
+    def history_rows(self) -> int:
+        """Rows of `State.history`: the most that any law keeps."""
+        return max(len(law.history) for law, _, _ in self.segments)
+
+    @property
+    def keeps_total(self) -> bool:
+        """Whether `State.total` exists."""
+        return self.track_total and any(law.plastic for law, _, _ in self.segments)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Model:
+    """What a gradient may reach and a step does not change. A pytree.
+
+    mass: (N,) [kg]; volume: (N,) rest volume [m^3]; parameters: name -> (N,), as the laws name
+    them; gravity: (3,) [m/s^2]; boundaries: grid and particle boundaries, applied in order;
+    rest: (3, N) [m], the positions by which particle boundaries choose, None if there are none.
+    """
+
+    mass: Array
+    volume: Array
+    parameters: dict[str, Array]
+    gravity: Array
+    boundaries: tuple = ()
+    rest: Array | None = None
+
+
+class Status(NamedTuple):
+    """Whether a simulation is sound, and if not, what failed first. All scalars, int32.
+
+    code: OK, NOT_FINITE, LEFT_GRID, STEP_TOO_LARGE or LEFT_WINDOW; step: steps taken before the
+    one that failed; particle: the lowest index that failed in it; taken: steps taken in all.
+    `step` and `particle` are -1 while code is OK.
+    """
+
+    code: Array
+    step: Array
+    particle: Array
+    taken: Array
+
+
+class State(NamedTuple):
+    """What a step changes. Particle axis last.
+
+    position: (3, N) [m]; velocity: (3, N) [m/s]; affine: (3, 3, N), C [1/s];
+    deformation: (3, 3, N), the elastic trial gradient; total: (3, 3, N), the total gradient, or
+    None where it is the same or not asked for; history: (H, N) or None if no law keeps any;
+    time: () [s]; status: `Status`.
+    """
+
+    position: Array
+    velocity: Array
+    affine: Array
+    deformation: Array
+    total: Array | None
+    history: Array | None
+    time: Array
+    status: Status
+
+
+def initial_state(
+    config: Config,
+    position,
+    velocity=None,
+    deformation=None,
+    affine=None,
+    dtype=None,
+) -> State:
+    """The state at time 0 from arrays in public order.
+
+    position: (N, 3) [m]; velocity: (N, 3) [m/s], default 0; deformation: (N, 3, 3), default the
+    identity; affine: (N, 3, 3) [1/s], default 0; dtype: default that of `position`.
+    Raises `InputError` if a shape is wrong or there are not as many particles as segments cover.
+    """
+    count = config.particles
+    position = jnp.asarray(position, dtype)
+    dtype = position.dtype
+    if not jnp.issubdtype(dtype, jnp.floating):
+        raise InputError(f"initial_state: position has dtype {dtype}; give floating-point numbers.")
+
+    def last(name, value, shape):
+        value = jnp.asarray(value, dtype)
+        if value.shape != (count, *shape):
+            raise InputError(
+                f"initial_state: {name} has shape {value.shape}, but Config.segments cover "
+                f"{count} particles; give shape {(count, *shape)}."
+            )
+        # A copy in any case: the caller's array must survive the state's donation.
+        return jnp.array(jnp.moveaxis(value, 0, -1), copy=True)
+
+    def zeros(*shape):
+        return jnp.zeros((*shape, count), dtype)
+
+    if deformation is None:
+        deformation = jnp.broadcast_to(jnp.eye(3, dtype=dtype), (count, 3, 3))
+    history = None
+    if config.history_rows:
+        columns = []
+        for law, start, stop in config.segments:
+            initial = jnp.zeros((config.history_rows,), dtype)
+            initial = initial.at[: len(law.history)].set(jnp.array(law.history, dtype))
+            columns.append(jnp.broadcast_to(initial[:, None], (config.history_rows, stop - start)))
+        history = jnp.concatenate(columns, axis=1)
+
+    return State(
+        position=last("position", position, (3,)),
+        velocity=zeros(3) if velocity is None else last("velocity", velocity, (3,)),
+        affine=zeros(3, 3) if affine is None else last("affine", affine, (3, 3)),
+        deformation=last("deformation", deformation, (3, 3)),
+        total=last("deformation", deformation, (3, 3)) if config.keeps_total else None,
+        history=history,
+        time=jnp.zeros((), dtype),
+        status=Status(
+            code=jnp.array(OK, jnp.int32),
+            step=jnp.array(-1, jnp.int32),
+            particle=jnp.array(-1, jnp.int32),
+            taken=jnp.array(0, jnp.int32),
+        ),
+    )

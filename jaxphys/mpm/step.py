@@ -1,0 +1,177 @@
+"""One explicit MLS-MPM step (Hu et al. 2018) with APIC transfers (Jiang et al. 2015)."""
+
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.core.errors import InputError
+
+from .boundaries import GridBoundary
+from .grid import node_coordinates
+from .kernel import base_node, inside
+from .particle_boundaries import ParticleBoundary
+from .state import (
+    LEFT_GRID,
+    LEFT_WINDOW,
+    NOT_FINITE,
+    OK,
+    STEP_TOO_LARGE,
+    Config,
+    Model,
+    State,
+    Status,
+)
+from .transfer import grid_to_particle, particle_to_grid, window_origin
+
+
+def step(config: Config, model: Model, state: State, dt) -> State:
+    """The state one time step `dt` [s] later. Pure; holds only the parts that the scene lists.
+
+    In order: the laws (return map and stress of the trial gradient together), momentum and mass to
+    the grid, gravity and grid boundaries, velocity and its gradient back, particle boundaries,
+    x <- x + dt v, F <- (I + dt C) F. The status says what failed first; the step itself goes on
+    whatever happens, and addresses no memory outside the grid.
+    """
+    grid, shape = config.grid, config.nodes
+    dt = jnp.asarray(dt, state.position.dtype)
+    F, stress, history = apply_laws(config, model, state)
+
+    # Momentum changes by m C per metre, less the impulse of the stress: -dt V tau grad w, in which
+    # MLS-MPM replaces grad w by w (x_i - x_p) 4 / dx^2.
+    impulse = (-4.0 / grid.spacing**2) * dt * model.volume
+    affine = model.mass * state.affine + impulse * stress
+    origin = window_origin(shape, grid.spacing, grid.shape, state.position)
+    rows = particle_to_grid(
+        shape,
+        grid.spacing,
+        grid.shape,
+        origin,
+        state.position,
+        model.mass,
+        model.mass * state.velocity,
+        affine,
+    )
+    rows = update_grid(config, model, rows, origin, state.time, dt)
+    velocity, moment = grid_to_particle(
+        shape, grid.spacing, grid.shape, origin, state.position, rows
+    )
+    C = moment * (4.0 / grid.spacing**2)
+    velocity = move_particles(model, state, velocity, dt)
+    position = state.position + dt * velocity
+    F = advance_gradient(F, C, dt)
+    total = None if state.total is None else advance_gradient(state.total, C, dt)
+    return State(
+        position=position,
+        velocity=velocity,
+        affine=C,
+        deformation=F,
+        total=total,
+        history=history,
+        time=state.time + dt,
+        status=judge(config, state, position, velocity, F, dt, origin),
+    )
+
+
+def apply_laws(config: Config, model: Model, state: State) -> tuple[Array, Array, Array | None]:
+    """Elastic F (3, 3, N), Kirchhoff stress (3, 3, N) [Pa] and history of every segment's law."""
+    gradients, stresses, histories = [], [], []
+    for law, start, stop in config.segments:
+        kept = len(law.history)
+        parameters = {name: model.parameters[name][start:stop] for name in law.parameters}
+        if state.history is None:
+            memory = jnp.zeros((0, stop - start), state.position.dtype)
+        else:
+            memory = state.history[:kept, start:stop]
+        F, stress, memory = law.update(parameters, state.deformation[:, :, start:stop], memory)
+        gradients.append(F)
+        stresses.append(stress)
+        if state.history is not None:
+            histories.append(jnp.concatenate([memory, state.history[kept:, start:stop]]))
+    return _join(gradients), _join(stresses), _join(histories) if histories else None
+
+
+def _join(parts: list[Array]) -> Array:
+    return parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)
+
+
+def update_grid(
+    config: Config, model: Model, rows: Array, origin: Array, time: Array, dt: Array
+) -> Array:
+    """Node velocities [m/s] from momentum and mass rows, both (M, 4); the last column is void.
+
+    Nodes with next to no mass stand still: below eps^2 of the heaviest particle a node adds less
+    than round-off to any particle, and dividing by its mass could overflow.
+    """
+    mass = rows[:, 3:]
+    least = jnp.finfo(rows.dtype).eps ** 2 * jnp.max(model.mass)
+    filled = mass > least
+    # All four columns at once: XLA would otherwise pad each row that a transfer reads.
+    fall = dt * jnp.concatenate([model.gravity, jnp.zeros_like(model.gravity[:1])])
+    rows = jnp.where(filled, rows / jnp.where(filled, mass, 1.0) + fall, 0.0)
+    boundaries = [b for b in model.boundaries if isinstance(b, GridBoundary)]
+    if not boundaries:
+        return rows
+    shape = config.nodes
+    coordinates = node_coordinates(shape, config.grid.spacing, origin, rows.dtype)
+    velocity = rows.T[:3].reshape(3, *shape)
+    for boundary in boundaries:
+        velocity = boundary.apply(velocity, coordinates, time, dt)
+    return jnp.concatenate([velocity.reshape(3, -1), rows.T[3:]]).T
+
+
+def move_particles(model: Model, state: State, velocity: Array, dt: Array) -> Array:
+    """Particle velocities (3, N) [m/s] after the particle boundaries."""
+    for boundary in model.boundaries:
+        if isinstance(boundary, ParticleBoundary):
+            if model.rest is None:
+                raise InputError(
+                    f"Model.rest is None, but {type(boundary).__name__} chooses particles by it; "
+                    "set it to the initial positions (3, N)."
+                )
+            velocity = boundary.apply(
+                state.position, velocity, model.rest, model.mass, state.time, dt
+            )
+    return velocity
+
+
+def advance_gradient(F: Array, C: Array, dt: Array) -> Array:
+    """(I + dt C) F for (3, 3, N). Written as F + dt C F, which keeps small strains exact."""
+    product = [
+        [C[i, 0] * F[0, j] + C[i, 1] * F[1, j] + C[i, 2] * F[2, j] for j in range(3)]
+        for i in range(3)
+    ]
+    return F + dt * jnp.stack([jnp.stack(row) for row in product])
+
+
+def judge(
+    config: Config,
+    before: State,
+    position: Array,
+    velocity: Array,
+    F: Array,
+    dt: Array,
+    origin: Array,
+) -> Status:
+    """The status after a step. The first failure stays; of one step, the lowest particle's."""
+    grid, status = config.grid, before.status
+    finite = jnp.isfinite(jnp.sum(velocity, axis=0) + jnp.sum(F, axis=(0, 1)))
+    slow = jnp.sum(velocity**2, axis=0) * dt**2 <= grid.spacing**2
+    code = jnp.full(finite.shape, OK, jnp.int32)
+    if config.nodes != grid.shape:
+        # A particle that outgrew the window was clamped in the transfers of this very step.
+        room = jnp.array(config.nodes, jnp.int32)[:, None] - 3
+        local = base_node(before.position, grid.spacing, grid.shape) - origin[:, None]
+        code = jnp.where(jnp.all(local <= room, axis=0), code, LEFT_WINDOW)
+    code = jnp.where(inside(position, grid.spacing, grid.shape), code, LEFT_GRID)
+    code = jnp.where(slow, code, STEP_TOO_LARGE)
+    code = jnp.where(finite, code, NOT_FINITE)
+    # One reduction finds the particle and its code together.
+    count = code.shape[0]
+    keys = jnp.where(code == OK, 8 * count, 8 * jnp.arange(count, dtype=jnp.int32) + code)
+    first = jnp.min(keys)
+    fails = (status.code == OK) & (first < 8 * count)
+    return Status(
+        code=jnp.where(fails, first % 8, status.code),
+        step=jnp.where(fails, status.taken, status.step),
+        particle=jnp.where(fails, first // 8, status.particle),
+        taken=status.taken + 1,
+    )

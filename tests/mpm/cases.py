@@ -1,0 +1,54 @@
+"""Small scenes shared by the solver's tests."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxphys.mpm.elasticity import NEO_HOOKEAN
+from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.state import Config, Model, initial_state
+
+
+def block(count=60, shape=(9, 10, 11), dtype=jnp.float64, seed=0, law=NEO_HOOKEAN, **options):
+    """A random block in motion: (config, model, state). Spacing 0.1 m; strained, spinning."""
+    random = np.random.default_rng(seed)
+    grid = Grid(shape, 0.1)
+    position = 0.25 + 0.35 * random.random((count, 3))
+    config = Config(grid, ((law, 0, count),), **options)
+    model = Model(
+        mass=jnp.asarray(0.1 + 0.2 * random.random(count), dtype),
+        volume=jnp.asarray(1e-4 * (1 + random.random(count)), dtype),
+        parameters={
+            "youngs_modulus": jnp.asarray(1e3 * (1 + random.random(count)), dtype),
+            "poisson_ratio": jnp.asarray(0.2 + 0.2 * random.random(count), dtype),
+        },
+        gravity=jnp.asarray([0.1, -0.2, -9.8], dtype),
+    )
+    state = initial_state(
+        config,
+        position,
+        velocity=0.5 * random.normal(size=(count, 3)),
+        deformation=np.eye(3) + 0.1 * random.normal(size=(count, 3, 3)),
+        affine=random.normal(size=(count, 3, 3)),
+        dtype=dtype,
+    )
+    return config, model, state
+
+
+def public(state):
+    """(x, v, C, F) with the particle axis first."""
+    fields = (state.position, state.velocity, state.affine, state.deformation)
+    return tuple(jnp.moveaxis(field, -1, 0) for field in fields)
+
+
+def count_primitives(jaxpr, name):
+    """How often a primitive occurs in a jaxpr, those inside others included."""
+    total = 0
+    for equation in jaxpr.eqns:
+        total += equation.primitive.name == name
+        for value in equation.params.values():
+            for inner in value if isinstance(value, tuple | list) else (value,):
+                if hasattr(inner, "jaxpr"):
+                    inner = inner.jaxpr
+                if hasattr(inner, "eqns"):
+                    total += count_primitives(inner, name)
+    return total
