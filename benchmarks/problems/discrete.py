@@ -1,0 +1,251 @@
+"""From a motion to particles on a grid, and from the particles back to an error.
+
+The grid's spacing is the unit of length of what is solved, so that levels of one problem differ in
+numbers only: given the same `Room`, they share one compiled program.
+
+Velocities start at t = -dt/2: the step is v <- v + dt a(x), x <- x + dt v, which is the leapfrog
+scheme, second order in dt, when v is read as the velocity half a step before x.
+"""
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from benchmarks.problems.kinematics import deformation_gradient, velocity
+from jaxphys.core import algebra
+from jaxphys.mpm.boundaries import FOREVER, GridBoundary, HalfSpace
+from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.law import Law
+from jaxphys.mpm.state import Config, Model, State, initial_state
+from jaxphys.mpm.step import step
+
+
+class Room(NamedTuple):
+    """What a compiled program has room for: particles, and nodes per axis.
+
+    Particles that a problem does not need have no mass and no volume, and rest at its origin.
+    """
+
+    particles: int
+    nodes: tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A problem with a known answer, ready to be solved. Lengths in units of `spacing`.
+
+    Attributes:
+        config, model, state: what `step` takes.
+        dt: [s]; steps: how many.
+        exact: (3, N) positions after the last step.
+        spacing: dx of the grid [m].
+        scale: the displacement [m] that errors are relative to.
+        count: how many particles are the problem's.
+    """
+
+    config: Config
+    model: Model
+    state: State
+    dt: float
+    steps: int
+    exact: Array
+    spacing: float
+    scale: float
+    count: int
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class BodyForce(GridBoundary):
+    """Adds dt b(x, t) to the velocity of every node.
+
+    Attributes:
+        truth: the problem, whose `body_acceleration(x (3, ...), t)` is b [m/s^2] at places x [m].
+        origin: (3,) where the problem's origin sits on the grid [dx].
+        spacing: dx [m], ().
+        share: what part of b to apply, (): 1, or another number in a negative control.
+    """
+
+    truth: object
+    origin: Array
+    spacing: Array
+    share: Array
+
+    def apply(self, velocity: Array, coordinates: tuple, time: Array, dt: Array) -> Array:
+        offsets = [self.spacing * (x - self.origin[axis]) for axis, x in enumerate(coordinates)]
+        x = jnp.stack(jnp.broadcast_arrays(*offsets))
+        b = self.truth.body_acceleration(x, time) / self.spacing
+        return velocity + (dt * self.share * b).astype(velocity.dtype)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Planar(GridBoundary):
+    """Keeps the motion in the plane normal to an axis (plane strain)."""
+
+    axis: int = field(metadata={"static": True})
+
+    def apply(self, velocity: Array, coordinates: tuple, time: Array, dt: Array) -> Array:
+        return velocity.at[self.axis].set(0.0)
+
+
+def held_up_to(coordinate: float, dtype) -> HalfSpace:
+    """Holds all nodes with x up to `coordinate` [dx]; a large negative one holds none."""
+    zero = jnp.zeros(3, dtype)
+    return HalfSpace(
+        point=zero.at[0].set(coordinate + 0.25),
+        normal=zero.at[0].set(1.0),
+        friction=jnp.zeros((), dtype),
+        velocity=zero,
+        start=jnp.zeros((), dtype),
+        end=jnp.asarray(FOREVER, dtype),
+        surface="sticky",
+    )
+
+
+def steps_for(duration: float, courant: float, spacing: float, speed: float) -> tuple[float, int]:
+    """(dt [s], steps) that cover `duration` [s] exactly with speed * dt <= courant * spacing."""
+    steps = int(np.ceil(duration * speed / (courant * spacing) - 1e-9))
+    return duration / steps, steps
+
+
+@jax.jit
+def _sample(truth, X, early, end):
+    """Positions, velocities, F and C at the start, and positions at the end, of X (3, N)."""
+    start = jnp.zeros_like(end)
+
+    def one(X):
+        F = deformation_gradient(truth.motion, X, start)
+        rate = jax.jacfwd(lambda point: velocity(truth.motion, point, early))(X)
+        affine = algebra.matmul(rate, algebra.inverse(F))
+        v = velocity(truth.motion, X, early)
+        return truth.motion(X, start), v, F, affine, truth.motion(X, end)
+
+    return jax.vmap(one)(X)
+
+
+def discretise(
+    truth,
+    points: np.ndarray,
+    volume,
+    *,
+    law: Law,
+    poisson: float,
+    nodes: tuple[int, int, int],
+    origin,
+    spacing: float,
+    dt: float,
+    steps: int,
+    scale: float,
+    gravity=(0.0, 0.0, 0.0),
+    boundaries: tuple = (),
+    staggered: bool = True,
+    room: Room | None = None,
+    dtype=jnp.float64,
+) -> Problem:
+    """Particles at `points` (N, 3) [m] with rest `volume` (N,) or () [m^3] that start on a motion.
+
+    Args:
+        truth: a pytree with `motion`, `youngs` [Pa] and `density` [kg/m^3].
+        nodes: of the grid; `room` may give more.
+        origin: (3,) where the motion's origin sits on the grid [dx].
+        spacing: dx [m]; scale: see `Problem`; gravity: [m/s^2].
+        boundaries: in units of dx.
+        staggered: whether velocities start at -dt/2 rather than at 0.
+    """
+    count = len(points)
+    room = room or Room(count, nodes)
+    X = np.zeros((room.particles, 3))
+    X[:count] = points
+    real = np.arange(room.particles) < count
+    rest_volume = np.zeros(room.particles)
+    rest_volume[:count] = np.asarray(volume) / spacing**3
+    early = -dt / 2 if staggered else 0.0
+    x, v, F, affine, exact = _sample(truth, jnp.asarray(X), early, dt * steps)
+    # What fills the room has no motion of its own.
+    v = jnp.where(real[:, None], v, 0.0)
+    F = jnp.where(real[:, None, None], F, jnp.eye(3))
+    affine = jnp.where(real[:, None, None], affine, 0.0)
+    full = lambda value: jnp.full((room.particles,), value, dtype)  # noqa: E731
+    volume = jnp.asarray(rest_volume, dtype)
+    config = Config(Grid(room.nodes, 1.0), ((law, 0, room.particles),))
+    model = Model(
+        mass=volume * truth.density,
+        volume=volume,
+        # Stress over density is a speed squared: lengths in dx make it smaller by dx^2.
+        parameters={
+            "youngs_modulus": full(truth.youngs / spacing**2),
+            "poisson_ratio": full(poisson),
+        },
+        gravity=jnp.asarray(gravity, dtype) / spacing,
+        boundaries=boundaries,
+    )
+    origin = jnp.asarray(origin, jnp.float64)
+    state = initial_state(config, x / spacing + origin, v / spacing, F, affine, dtype=dtype)
+    return Problem(
+        config, model, state, dt, steps, (exact / spacing + origin).T, spacing, scale, count
+    )
+
+
+@partial(jax.jit, static_argnums=0)
+def _advance(config, model, state, dt, steps, keep):
+    def body(_, state):
+        state = step(config, model, state, dt)
+        return state._replace(affine=keep * state.affine)
+
+    return jax.lax.fori_loop(0, steps, body, state)
+
+
+def solve(problem: Problem, keep_affine: float = 1.0, steps: int | None = None) -> State:
+    """The state after all steps, or after `steps`; its status says whether they are sound.
+
+    keep_affine: what part of C survives a step. 0 makes it a particle-in-cell method that forgets
+    all but the mean velocity: a negative control.
+    """
+    steps = problem.steps if steps is None else steps
+    dtype = problem.state.position.dtype
+    keep = jnp.asarray(keep_affine, dtype)
+    return _advance(problem.config, problem.model, problem.state, problem.dt, steps, keep)
+
+
+def displacement_errors(problem: Problem, state: State) -> tuple[float, float]:
+    """(L2, largest) error of the positions over `problem.scale`; infinite if the run failed.
+
+    L2 is the root of the volume-weighted mean square over particles.
+    """
+    if int(state.status.code):
+        return float("inf"), float("inf")
+    n = problem.count
+    difference = np.asarray(state.position)[:, :n] - np.asarray(problem.exact)[:, :n]
+    square = np.sum(difference**2, axis=0) * (problem.spacing / problem.scale) ** 2
+    mean = np.average(square, weights=np.asarray(problem.model.volume)[:n])
+    return float(np.sqrt(mean)), float(np.sqrt(square.max()))
+
+
+def volume_gain(problem: Problem, state: State) -> float:
+    """Relative change of the total volume, sum V0 (J - 1) / sum V0."""
+    J = np.linalg.det(np.moveaxis(np.asarray(state.deformation), -1, 0))
+    return float(np.average(J - 1, weights=np.asarray(problem.model.volume)))
+
+
+def energy(problem: Problem, state: State) -> float:
+    """Kinetic energy (with that of the affine parts, m D |C|^2 / 2) and stored energy.
+
+    In units of kg dx^2/s^2; of one law for all particles; gravity's potential is not in it.
+    """
+    ((law, _, _),) = problem.config.segments
+    speed = jnp.sum(state.velocity**2, axis=0) + 0.25 * jnp.sum(state.affine**2, axis=(0, 1))
+    stored = law.energy(problem.model.parameters, state.deformation)
+    return float(jnp.sum(0.5 * problem.model.mass * speed + problem.model.volume * stored))
+
+
+def observed_order(sizes, errors) -> float:
+    """Slope of log(error) over log(size), by least squares; not a number if a run failed."""
+    if not np.all(np.isfinite(errors)):
+        return float("nan")
+    return float(np.polyfit(np.log(np.asarray(sizes)), np.log(np.asarray(errors)), 1)[0])
