@@ -4,6 +4,15 @@ from .colour import ColourRange as ColourRange
 from .colour import colour_range as colour_range
 from .colour import regularise as regularise
 from .colour import to_unit_interval as to_unit_interval
+from .density import DensityConfig as DensityConfig
+from .density import DensityUpdate as DensityUpdate
+from .density import carry_moments as carry_moments
+from .density import control_density as control_density
+from .density import lower_opacity as lower_opacity
+from .density import with_capacity as with_capacity
+from .filling import FillingConfig as FillingConfig
+from .filling import fill_interior as fill_interior
+from .filling import particle_volumes as particle_volumes
 from .gaussians import Gaussians as Gaussians
 from .gaussians import axes as axes
 from .gaussians import concatenate as concatenate
@@ -22,6 +31,7 @@ from .mesh import Mesh as Mesh
 from .mesh import load_mesh as load_mesh
 from .ply import read_ply as read_ply
 from .ply import write_ply as write_ply
+from .relax import blue_noise as blue_noise
 from .splat_file import write_splat as write_splat
 from .surface import gaussians_from_mesh as gaussians_from_mesh
 from .surface import sample_surface as sample_surface

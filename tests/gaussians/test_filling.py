@@ -1,0 +1,173 @@
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from jaxphys.core.errors import InputError
+from jaxphys.gaussians.filling import FillingConfig, fill_interior, inner_cells, particle_volumes
+from jaxphys.gaussians.gaussians import Gaussians
+from jaxphys.gaussians.relax import blue_noise
+from jaxphys.gaussians.surface import facing
+
+CONFIG = FillingConfig(spacing=0.1, density_threshold=0.5)
+
+
+def shell(count=2500, opening=2.0, size=0.05):
+    """Discs on the unit sphere, up to height `opening`."""
+    index = np.arange(count) + 0.5
+    z, turn = 1 - 2 * index / count, np.pi * (1 + np.sqrt(5)) * index
+    radius = np.sqrt(1 - z * z)
+    d = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=-1)[z < opening]
+    sizes = np.broadcast_to([size, size, 0.1 * size], d.shape)
+    return Gaussians(
+        jnp.asarray(d),
+        jnp.log(jnp.asarray(sizes)),
+        jnp.asarray(facing(d)),
+        jnp.full(len(d), 3.0),
+        jnp.zeros((len(d), 1, 3)),
+    )
+
+
+@pytest.mark.parametrize("ray", [-1, 0, 1, 4, 5])
+def test_a_hollow_ball_is_filled(ray):
+    points = fill_interior(shell(), dataclasses.replace(CONFIG, ray_direction=ray), seed=1)
+    radius = np.linalg.norm(points, axis=1)
+    assert radius.max() < 1.2
+    inner = np.sum(radius < 0.8)
+    np.testing.assert_allclose(inner, 4 / 3 * np.pi * 0.8**3 / 0.1**3, rtol=0.05)
+    again = fill_interior(shell(), dataclasses.replace(CONFIG, ray_direction=ray), seed=1)
+    np.testing.assert_array_equal(points, again)
+    cells = np.unique(np.floor(points / 0.1 + 1e-9), axis=0)
+    assert len(cells) > 0.5 * len(points)
+
+
+def test_an_open_bowl_is_filled_only_when_told():
+    bowl = shell(opening=0.5)
+
+    def inside(**options):
+        points = fill_interior(bowl, dataclasses.replace(CONFIG, **options))
+        return int(np.sum(np.linalg.norm(points, axis=1) < 0.5))
+
+    assert inside() == 0
+    # Without looking up, the bowl closes; an odd number of runs downwards agrees.
+    expected = 4 / 3 * np.pi * 0.5**3 / 0.1**3
+    np.testing.assert_allclose(inside(exclude_direction=4), expected, rtol=0.1)
+    np.testing.assert_allclose(inside(search_count=5), expected, rtol=0.1)
+    np.testing.assert_allclose(inside(search_count=5, ray_direction=5), expected, rtol=0.1)
+    assert inside(search_count=5, ray_direction=4) == 0
+
+
+def test_rules_on_a_grid_by_hand():
+    # A ring in the xy plane around an empty cell, and a second empty cell outside of it.
+    density = np.zeros((5, 4, 1))
+    density[0:3, 0:3, 0] = 1
+    density[1, 1, 0] = 0
+    density[4, 1, 0] = 0
+    config = FillingConfig(1.0, density_threshold=0.5, search_count=4)
+    assert np.argwhere(inner_cells(density, config)).tolist() == [[1, 1, 0]]
+    strict = dataclasses.replace(config, search_count=5)
+    assert not inner_cells(density, strict).any()
+    # Two runs lie towards +x of (1, 1) once there is a wall at x = 4.
+    density[4, 1, 0] = 1
+    assert not inner_cells(density, dataclasses.replace(config, ray_direction=0)).any()
+    assert inner_cells(density, dataclasses.replace(config, ray_direction=1)).any()
+    higher = dataclasses.replace(config, search_threshold=1.5)
+    assert not inner_cells(density, higher).any()
+
+
+def test_counts_area_and_limits():
+    one = fill_interior(shell(), CONFIG)
+    three = fill_interior(shell(), dataclasses.replace(CONFIG, per_cell=3))
+    inner = [np.sum(np.linalg.norm(p, axis=1) < 0.7) for p in (one, three)]
+    np.testing.assert_allclose(inner[1], 3 * inner[0], rtol=0.05)
+    upper = dataclasses.replace(CONFIG, area=(-2, 2, -2, 2, 0, 2))
+    # The lower half is cut off, and the upper then has nothing below it.
+    assert np.all(fill_interior(shell(), upper)[:, 2] > 0)
+    open_below = dataclasses.replace(upper, exclude_direction=5)
+    assert np.sum(np.linalg.norm(fill_interior(shell(), open_below), axis=1) < 0.7) > 500
+    with pytest.raises(InputError, match="more than the maximum of 100"):
+        fill_interior(shell(), dataclasses.replace(CONFIG, maximum=100))
+    with pytest.raises(InputError, match="make it coarser"):
+        fill_interior(shell(), dataclasses.replace(CONFIG, spacing=1e-4))
+    with pytest.raises(InputError, match="must be positive"):
+        fill_interior(shell(), dataclasses.replace(CONFIG, spacing=0.0))
+    with pytest.raises(InputError, match="holds no Gaussians"):
+        fill_interior(shell(), dataclasses.replace(CONFIG, area=(5, 6, 5, 6, 5, 6)))
+
+
+def test_enormous_degenerate_and_invalid_gaussians():
+    g = shell()
+    huge = dataclasses.replace(g, log_scales=g.log_scales.at[0].set(1e4).at[1].set(-1e4))
+    huge = dataclasses.replace(huge, quaternions=huge.quaternions.at[2].set(0))
+    points = fill_interior(huge, CONFIG)
+    assert np.isfinite(points).all() and np.linalg.norm(points, axis=1).max() < 2.2
+    nan = dataclasses.replace(g, log_scales=g.log_scales.at[3].set(jnp.nan))
+    with pytest.raises(InputError, match="filling: log_scales not finite"):
+        fill_interior(nan, CONFIG)
+    none = Gaussians(*(jnp.zeros((0, *s)) for s in [(3,), (3,), (4,), (), (1, 3)]))
+    assert fill_interior(none, CONFIG).shape == (0, 3)
+
+
+@pytest.mark.parametrize("shape", ["ball", "cube"])
+@pytest.mark.parametrize("per_cell", [8, 27])
+def test_volumes_add_up(shape, per_cell):
+    random = np.random.default_rng(0)
+    points = random.uniform(-1, 1, (40_000, 3))
+    volume = 8.0
+    if shape == "ball":
+        points = points[np.linalg.norm(points, axis=1) < 1]
+        volume = 4 / 3 * np.pi
+    spacing = (volume * per_cell / len(points)) ** (1 / 3)
+    volumes = particle_volumes(points, spacing)
+    assert volumes.shape == (len(points),) and volumes.min() > 0
+    np.testing.assert_allclose(volumes.sum(), volume, rtol=0.12)
+    # One grid, where the cells that the surface cuts count whole, is farther off for the ball.
+    if shape == "ball":
+        cells = len(np.unique(np.floor(points / spacing), axis=0))
+        assert abs(volumes.sum() - volume) < abs(cells * spacing**3 - volume)
+    assert particle_volumes(points[:1], 0.5)[0] == 0.125
+    assert particle_volumes(points[:0], 0.5).shape == (0,)
+
+
+def nearest(points):
+    return cKDTree(points).query(points, k=2)[0][:, 1]
+
+
+def test_relaxed_points_are_blue_noise():
+    random = np.random.default_rng(0)
+    points = random.uniform(0, 2.0, (700, 3))
+    diameter = 2.0 / 700 ** (1 / 3)
+    relaxed = blue_noise(points, diameter)
+    before, after = nearest(points) / diameter, nearest(relaxed) / diameter
+    assert before.std() / before.mean() > 0.3  # Poisson: 0.36
+    assert after.std() / after.mean() < 0.1
+    assert np.quantile(after, 0.05) > 0.75 > np.quantile(before, 0.5)
+    assert np.abs(relaxed - points).max() <= 0.75 * diameter * (1 + 1e-5)
+    np.testing.assert_array_equal(relaxed, blue_noise(points, diameter))
+
+
+def test_neighbour_lists_that_are_too_short_are_made_longer(monkeypatch):
+    points = np.random.default_rng(0).uniform(0, 4.0, (64, 3))
+    monkeypatch.setattr("jaxphys.gaussians.relax._CAPACITY", 0.3)
+    # Spheres whose neighbour was dropped from the list would still overlap.
+    relaxed = blue_noise(points, 1.0)
+    assert nearest(relaxed).min() > 0.7 > np.quantile(nearest(points), 0.6)
+
+
+def test_fixed_points_push_but_do_not_move():
+    fixed = np.array([[0.0, 0.0, 0.0]])
+    relaxed = blue_noise(np.array([[0.1, 0.0, 0.0]], np.float32), 1.0, fixed=fixed)
+    assert relaxed.dtype == np.float32
+    np.testing.assert_allclose(relaxed[0, 1:], 0, atol=1e-5)
+    assert 0.8 < relaxed[0, 0] <= 0.86  # as far as a point may go
+
+
+def test_nothing_to_relax():
+    np.testing.assert_array_equal(blue_noise(np.ones((1, 3)), 0.1), np.ones((1, 3)))
+    assert blue_noise(np.zeros((0, 3)), 0.1).shape == (0, 3)
+    with pytest.raises(InputError, match="must be positive"):
+        blue_noise(np.zeros((3, 3)), 0.0)
+    with pytest.raises(InputError, match="not finite"):
+        blue_noise(np.full((3, 3), np.nan), 0.1)
