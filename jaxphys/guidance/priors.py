@@ -1,0 +1,68 @@
+"""The bundled priors: modules from named arrays, and the arrays from files."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from functools import cache
+from typing import Any, TypeVar
+
+import jax
+import jax.numpy as jnp
+from flax import nnx
+
+from jaxphys import weights
+from jaxphys.core.errors import InputError
+from jaxphys.guidance.pixel_prior import PixelPrior, PixelPriorConfig
+from jaxphys.guidance.point_prior import PointPrior, PointPriorConfig
+
+Array = jax.Array
+Module = TypeVar("Module", bound=nnx.Module)
+
+
+def _name(path: tuple) -> str:
+    keys = [getattr(entry, "key", getattr(entry, "idx", None)) for entry in path]
+    return "/".join(str(key) for key in keys if key is not None)
+
+
+def named_parameters(module: nnx.Module) -> dict[str, Array]:
+    """Every parameter under a name such as `layers/0/attention/output/kernel`."""
+    leaves, _ = jax.tree_util.tree_flatten_with_path(nnx.state(module, nnx.Param))
+    return {_name(path): leaf for path, leaf in leaves}
+
+
+def with_parameters(module: Module, parameters: dict[str, Array]) -> Module:
+    """A module like `module` (whose own arrays are not read) that holds `parameters`.
+
+    Cheap and free of effects: made to be called inside a jitted function.
+    """
+    graph, state = nnx.split(module, nnx.Param)
+    leaves, structure = jax.tree_util.tree_flatten_with_path(state)
+    return nnx.merge(graph, structure.unflatten([parameters[_name(path)] for path, _ in leaves]))
+
+
+def _load(name: str, kind: type[Module], config_type: type) -> tuple[Module, dict[str, Any]]:
+    arrays, entry = weights.load(name)
+    known = {field.name for field in fields(config_type)}
+    config = config_type(**{k: v for k, v in entry["config"].items() if k in known})
+    module = nnx.eval_shape(lambda: kind(config, rngs=nnx.Rngs(0)))
+    expected = named_parameters(module)
+    wrong = [n for n, v in expected.items() if n not in arrays or arrays[n].shape != v.shape]
+    if wrong:
+        raise InputError(f"weights {name!r}: no array {wrong[0]!r} of the shape that it needs")
+    parameters = {n: jnp.asarray(arrays[n].astype("float32")) for n in expected}
+    return with_parameters(module, parameters), entry
+
+
+@cache
+def load_point_prior() -> tuple[PointPrior, dict[str, Any]]:
+    """The bundled point prior in float32 and its manifest entry (data, steps, held-out loss ...).
+
+    Raises InputError if the file is missing, damaged, or does not fit its entry.
+    """
+    return _load("point_prior", PointPrior, PointPriorConfig)
+
+
+@cache
+def load_pixel_prior() -> tuple[PixelPrior, dict[str, Any]]:
+    """The bundled pixel prior, as `load_point_prior`."""
+    return _load("pixel_prior", PixelPrior, PixelPriorConfig)
