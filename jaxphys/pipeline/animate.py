@@ -144,6 +144,7 @@ def _film(
     watch: Watch | None,
 ) -> bool:
     artist = Artist(scene, simulation, record.positions, timing)
+    artist.prepare(record.positions, record.deformations)
     sheet = ContactSheet(scene.frames)
     watch_pictures = None if watch is None else lambda frame: watch("render", frame)
     aside = out / f".motion.{os.getpid()}.mp4"
@@ -166,6 +167,7 @@ def _save_last_good(
     position, gradient = record.positions[-1], record.deformations[-1]
     write_ply(out / "last_good.ply", deformed_gaussians(simulation, position, gradient))
     artist = Artist(scene, simulation, record.positions, timing)
+    artist.prepare(record.positions[-1:], record.deformations[-1:])
     last = len(record.positions) - 1
     write_picture(out / "last_good.png", artist.draw(last, position, gradient))
 

@@ -4,7 +4,6 @@ import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -13,17 +12,17 @@ from jax import Array
 from tqdm import tqdm
 
 from jaxphys.pipeline.backdrop import backdrop
-from jaxphys.pipeline.draw import draw
+from jaxphys.pipeline.draw import draw, frame_splats
 from jaxphys.pipeline.framing import frame_cameras
 from jaxphys.pipeline.interrupt import deferred_interrupt
 from jaxphys.pipeline.output import Timing
 from jaxphys.pipeline.video import ContactSheet, VideoWriter
-from jaxphys.render.camera import Camera
-from jaxphys.render.renderer import next_capacity
+from jaxphys.render.camera import Camera, position
+from jaxphys.render.renderer import next_capacity, required_pairs
 from jaxphys.scene.build import Simulation
 from jaxphys.scene.scene import Scene
 
-FIRST_CAPACITY = 1 << 18
+ROOM = 1.15  # capacity over what the frames looked at need
 
 
 @dataclass(frozen=True)
@@ -82,6 +81,13 @@ def picture(
     return jnp.round(255 * jnp.clip(image.colour, 0, 1)).astype(jnp.uint8), image.required
 
 
+@jax.jit
+def _needed(simulation: Simulation, positions: Array, deformations: Array, camera: Camera) -> Array:
+    """Pairs of tile and splat of one frame."""
+    splats = frame_splats(simulation, positions, deformations, position(camera))
+    return required_pairs(splats, camera)
+
+
 class Artist:
     """Draws frames of one scene; compiles once, and again only where a frame needs more room."""
 
@@ -98,11 +104,11 @@ class Artist:
         low, high = first.min(axis=0), first.max(axis=0)
         self._middle = jnp.asarray((low + high)[:2] / 2)
         self._extent = jnp.asarray(max(1.2 * float(np.max(high - low)), 1e-3), jnp.float32)
-        self._capacity = FIRST_CAPACITY
+        self._capacity = 0
         self._programs: dict[int, Callable] = {}
 
-    def _run(self, position, deformation, camera):
-        arguments = (self._simulation, position, deformation, camera, self._middle, self._extent)
+    def _run(self, place, deformation, camera):
+        arguments = (self._simulation, place, deformation, camera, self._middle, self._extent)
         program = self._programs.get(self._capacity)
         if program is None:
             with self._timing.compiling("render"):
@@ -112,10 +118,27 @@ class Artist:
             self._programs[self._capacity] = program
         return program(*arguments)
 
-    def draw(self, index: int, position: np.ndarray, deformation: np.ndarray) -> np.ndarray:
+    def prepare(self, record_positions: list, record_deformations: list) -> None:
+        """Makes room for the first, the middle and the last frame, so that one program does."""
+        last = len(record_positions) - 1
+        with self._timing.compiling("render"):
+            needed = [
+                int(
+                    _needed(
+                        self._simulation,
+                        record_positions[i],
+                        record_deformations[i],
+                        self.cameras[i],
+                    )
+                )
+                for i in sorted({0, last // 2, last})
+            ]
+        self._capacity = next_capacity(int(ROOM * max(needed)))
+
+    def draw(self, index: int, place: np.ndarray, deformation: np.ndarray) -> np.ndarray:
         """Frame `index` as (H, W, 3) uint8."""
         while True:
-            pixels, required = self._run(position, deformation, self.cameras[index])
+            pixels, required = self._run(place, deformation, self.cameras[index])
             if int(required) <= self._capacity:
                 return np.asarray(pixels)
             self._capacity = next_capacity(int(required))
@@ -152,10 +175,3 @@ def film(
             if interrupted():
                 return False
     return True
-
-
-def save_frame(directory: Path, name: str, pixels: np.ndarray) -> None:
-    """Writes one frame as a PNG."""
-    from jaxphys.pipeline.video import write_picture
-
-    write_picture(directory / f"{name}.png", pixels)

@@ -2,16 +2,23 @@
 
 import dataclasses
 import os
+import time
 from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.files import write_json
-from jaxphys.gaussians.gaussians import Gaussians
+from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.gaussians.ply import read_ply, write_ply
 from jaxphys.guidance.refine import Refinement, check_prompt, refine
 from jaxphys.pipeline.animate import Watch, animate
+from jaxphys.pipeline.interrupt import deferred_interrupt
 from jaxphys.pipeline.output import Timing, run_directory
-from jaxphys.pipeline.resume import FOLDER, fingerprint
+from jaxphys.pipeline.resume import FOLDER, Checkpoint, fingerprint
+from jaxphys.pipeline.simulate import SAVE_EVERY
 from jaxphys.scene.build import validate
 from jaxphys.scene.scene import Generation, Scene
 
@@ -85,14 +92,47 @@ def _gaussians(
     asked = (refinement.refined, generation.steps, generation.splats, scene.seed)
     kept = out / FOLDER / f"object-{fingerprint(repr(asked).encode())[:16]}.ply"
     if not kept.exists():
-        from jaxphys.guidance.optimise import text_to_gaussians
+        checkpoint = Checkpoint(out, fingerprint(repr(asked).encode(), ()))
+        write_ply(kept, _optimise(refinement.refined, scene.seed, generation, checkpoint, progress))
+    return read_ply(kept)
 
-        gaussians = text_to_gaussians(
-            refinement.refined,
-            seed=scene.seed,
+
+def _optimise(
+    prompt: str, seed: int, generation: Generation, checkpoint: Checkpoint, progress: bool
+) -> Gaussians:
+    """Runs `text_to_gaussians`, going on from a checkpoint and saving one when interrupted."""
+    from jaxphys.guidance import optimise
+
+    given = {"steps": generation.steps, "count": generation.splats}
+    changes = {name: value for name, value in given.items() if value is not None}
+    config = dataclasses.replace(optimise.OptimiseConfig(), **changes)
+    resume, done = None, checkpoint.frame()
+    if done is not None:
+        arrays = checkpoint.load(done)
+        cloud = from_points(np.zeros((config.count, 3), np.float32), np.zeros(3), 1.0)
+        structure = jax.tree.structure(optimise.start(cloud, config))
+        resume = structure.unflatten([jnp.asarray(arrays[name]) for name in sorted(arrays)])
+    saved = time.monotonic()
+    with deferred_interrupt() as interrupted:
+
+        def on_step(state) -> None:
+            nonlocal saved
+            stop = interrupted()
+            if stop or time.monotonic() - saved > SAVE_EVERY:
+                leaves = jax.tree.leaves(state)
+                checkpoint.save(
+                    int(state.step), {f"leaf_{i:03d}": leaf for i, leaf in enumerate(leaves)}
+                )
+                saved = time.monotonic()
+            if stop:
+                raise KeyboardInterrupt
+
+        return optimise.text_to_gaussians(
+            prompt,
+            seed=seed,
             steps=generation.steps,
             count=generation.splats,
             progress=progress,
+            resume=resume,
+            on_step=on_step,
         )
-        write_ply(kept, gaussians)
-    return read_ply(kept)

@@ -5,12 +5,15 @@ soft
 enough that a second of motion takes some hundred steps.
 """
 
+from dataclasses import replace
+
 from jaxphys.mpm.materials import get_material
 from jaxphys.scene.boundaries import Plane, Walls
 from jaxphys.scene.scene import Domain, Ground, Object, Rotation, Scene
 
 FLOOR = 0.125
 SIDE = 2.5
+SPACING = 1 / 24
 SIZE = 0.9
 MIDDLE = (SIDE / 2, SIDE / 2)
 
@@ -19,7 +22,7 @@ def _scene(thing: Object, surface: str, friction: float, **fields) -> Scene:
     return Scene(
         objects=(thing,),
         boundaries=(Plane((*MIDDLE, FLOOR), (0.0, 0.0, 1.0), surface, friction), Walls()),
-        domain=Domain((SIDE, SIDE, 2.0), 1 / 24),
+        domain=Domain((SIDE, SIDE, 2.0), SPACING),
         ground=Ground(FLOOR),
         **fields,
     )
@@ -30,14 +33,19 @@ def _at(gap: float) -> tuple[float, float, float]:
     return (*MIDDLE, FLOOR + gap + SIZE / 2)
 
 
-def default_scene(material: str) -> Scene:
+def default_scene(material: str, *, spacing: float = SPACING) -> Scene:
     """The scene in which `animate --material NAME` shows an object.
 
+    Args:
+        material: its name.
+        spacing: of the grid [m]; half of it lies between the particles that fill the object.
+
     Raises:
-        InputError: an unknown material, with the nearest names.
+        InputError: an unknown material, with the nearest names, or a spacing out of range.
     """
     get_material(material)
-    return _SCENES[material]()
+    scene = _SCENES[material]()
+    return replace(scene, domain=replace(scene.domain, spacing=spacing))
 
 
 def _elastic() -> Scene:

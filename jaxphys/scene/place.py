@@ -10,8 +10,11 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.rotations import axis_angle_to_matrix
 from jaxphys.gaussians.filling import FillingConfig, fill_interior
 from jaxphys.gaussians.gaussians import Gaussians, opacities, select, transform
+from jaxphys.gaussians.relax import blue_noise
 from jaxphys.mpm.grid import Grid
 from jaxphys.scene.scene import Object
+
+RELAX_STEPS = 40
 
 
 class Placed(NamedTuple):
@@ -112,5 +115,8 @@ def _fill(moving: Gaussians, thing: Object, grid: Grid, seed: int, where: str) -
         points = fill_interior(moving, config, seed)
     except InputError as error:
         raise InputError(f"{where}.filling: {error}") from None
+    if filling.relax and len(points):
+        diameter = config.spacing / filling.per_cell ** (1 / 3)
+        points = blue_noise(points, diameter, fixed=np.asarray(moving.means), steps=RELAX_STEPS)
     low, high = grid.lower, np.array(grid.upper)
     return points[np.all((points > low) & (points < high), axis=1)]
