@@ -1,5 +1,6 @@
 """3D Gaussians: the parameters that optimisation changes and files hold (Kerbl et al. 2023)."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -124,7 +125,7 @@ def to_splats(
 
 def opacity_to_logit(opacity: Array) -> Array:
     """Logit of opacities in [0, 1], clipped to +-15 so that 0 and 1 stay finite."""
-    limit = 1 / (1 + np.exp(LOGIT_LIMIT))
+    limit = 1 / (1 + math.exp(LOGIT_LIMIT))
     clipped = jnp.clip(opacity, limit, 1 - limit)
     return jnp.clip(jnp.log(clipped) - jnp.log1p(-clipped), -LOGIT_LIMIT, LOGIT_LIMIT)
 
@@ -171,7 +172,7 @@ def from_points(
                 f"{name} of shape {value.shape} for {count} points: give {shape}"
             ) from error
 
-    smallest, largest = np.exp(-LOG_SCALE_LIMIT), np.exp(LOG_SCALE_LIMIT)
+    smallest, largest = math.exp(-LOG_SCALE_LIMIT), math.exp(LOG_SCALE_LIMIT)
     log_scales = jnp.log(jnp.clip(fit("sizes", sizes, (count, 3)), smallest, largest))
     if quaternions is None:
         quaternions = jnp.array([1, 0, 0, 0], dtype)
