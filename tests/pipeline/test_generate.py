@@ -1,0 +1,68 @@
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import jaxphys.guidance.optimise as optimise
+from jaxphys.core.errors import InputError
+from jaxphys.gaussians.gaussians import from_points
+from jaxphys.pipeline.generate import generate
+from jaxphys.scene import Domain, Object, Scene, read_scene
+
+SCENE = Scene(
+    objects=(
+        Object(parameters={"youngs_modulus": 2e3}, size=0.4, centre=(0.5, 0.5, 0.5), filling=None),
+    ),
+    domain=Domain((1.0, 1.0, 1.0), 1 / 14),
+    frames=2,
+    frame_time=0.01,
+    width=32,
+    height=24,
+)
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """Stands in for the optimisation, which has tests of its own; records what it is asked."""
+    asked = []
+
+    def made(prompt, **options):
+        asked.append((prompt, options["seed"], options["steps"], options["count"]))
+        points = np.random.default_rng(options["seed"]).normal(size=(40, 3))
+        return from_points(points.astype(np.float32), np.full(3, 0.5), 0.3)
+
+    monkeypatch.setattr(optimise, "text_to_gaussians", made)
+    monkeypatch.delenv("JAXPHYS_LLM_URL", raising=False)
+    return asked
+
+
+def test_prompt_is_refined_recorded_and_repeatable(calls, tmp_path):
+    out = generate("a strawberry", SCENE, tmp_path / "a", steps=3, splats=40)
+    prompt = json.loads((out / "prompt.json").read_text())
+    assert prompt["original"] == "a strawberry" and prompt["how"].startswith("offline")
+    assert calls[0][0] == prompt["refined"]
+    assert calls[0][1:] == (0, 3, 40)
+    again = generate(None, read_scene(out / "config.json").scene, tmp_path / "b")
+    assert calls[1] == calls[0]
+    for name in ("prompt.json", "config.json", "gaussians.ply", "motion.mp4", "metrics.jsonl"):
+        assert (again / name).read_bytes() == (out / name).read_bytes()
+
+
+def test_an_interrupted_run_keeps_the_object(calls, tmp_path):
+    def interrupt(stage, frame):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        generate("a can", SCENE, tmp_path, watch=interrupt)
+    generate("a can", SCENE, tmp_path)
+    assert len(calls) == 1
+    generate("a can", dataclasses.replace(SCENE, seed=1), tmp_path)
+    assert len(calls) == 2
+
+
+def test_unusable_prompts_leave_nothing(calls, tmp_path):
+    for prompt in ("", None):
+        with pytest.raises(InputError, match=r"^prompt: "):
+            generate(prompt, SCENE, tmp_path / "out")
+    assert not calls and not (tmp_path / "out").exists()

@@ -1,0 +1,109 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxphys.core.errors import InputError
+from jaxphys.gaussians.gaussians import covariances, from_points
+from jaxphys.pipeline.draw import draw
+from jaxphys.pipeline.rollout import rollout_frames
+from jaxphys.render.camera import orbit
+from jaxphys.scene import Domain, Object, Region, Rotation, Scene
+from jaxphys.scene.build import build
+
+POINTS = np.random.default_rng(0).uniform(-1, 1, (60, 3)).astype(np.float32)
+POINTS[0], POINTS[1] = (-2, 0, 0), (2, 0, 0)
+GAUSSIANS = from_points(POINTS, np.random.default_rng(1).uniform(0, 1, (60, 3)), 0.2)
+THING = dict(size=0.4, centre=(0.5, 0.5, 0.5), filling=None, parameters={"youngs_modulus": 1e3})
+
+
+def scene(**changes):
+    return Scene(
+        objects=(Object(**(THING | changes)),),
+        domain=Domain((1.0, 1.0, 1.0), 1 / 12),
+        frame_time=0.01,
+    )
+
+
+def carried(simulation):
+    """Positions of the particles that carry Gaussians, in the order of the Gaussians."""
+    return np.asarray(simulation.state.position).T[np.asarray(simulation.particles)]
+
+
+def test_every_gaussian_sits_on_its_particle():
+    simulation = build(scene(), GAUSSIANS)
+    assert np.array_equal(carried(simulation), np.asarray(simulation.gaussians.means))
+    # Same object, scaled by 0.1 about its middle.
+    offsets = carried(simulation) - 0.5
+    assert np.allclose(offsets, 0.1 * (POINTS - (POINTS.min(0) + POINTS.max(0)) / 2), atol=1e-6)
+    ratio = np.asarray(covariances(simulation.gaussians)) / 0.01
+    assert np.allclose(ratio, np.asarray(covariances(GAUSSIANS)), atol=1e-6)
+
+
+def test_turns_come_in_order():
+    x, z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+    turned = build(scene(rotation=(Rotation(z, 90.0), Rotation(x, 90.0))), GAUSSIANS)
+    # The long axis goes from x to y by the first turn, from y to z by the second.
+    reach = np.ptp(carried(turned), axis=0)
+    assert np.argmax(reach) == 2 and reach[2] == pytest.approx(0.4, rel=1e-4)
+
+
+def test_velocity_and_spin():
+    simulation = build(scene(velocity=(1.0, 0.0, 0.0), spin=(0.0, 0.0, 2.0)), GAUSSIANS)
+    position, velocity = (
+        np.asarray(simulation.state.position),
+        np.asarray(simulation.state.velocity),
+    )
+    assert np.allclose(velocity[0], 1 - 2 * (position[1] - 0.5), atol=1e-5)
+    assert np.allclose(velocity[1], 2 * (position[0] - 0.5), atol=1e-5)
+    gradient = np.asarray(simulation.state.affine)[:, :, 0]
+    assert np.allclose(gradient, [[0, -2, 0], [2, 0, 0], [0, 0, 0]])
+
+
+def test_regions_have_parameters_of_their_own():
+    right = Region((0.75, 0.5, 0.5), (0.25, 1.0, 1.0), {"youngs_modulus": 3e3})
+    simulation = build(scene(regions=(right,)), GAUSSIANS)
+    inside = np.asarray(simulation.state.position)[0] > 0.5
+    found = np.asarray(simulation.model.parameters["youngs_modulus"])
+    assert np.allclose(found, np.where(inside, 3e3, 1e3))
+
+
+def test_only_what_is_inside_the_area_moves():
+    simulation = build(scene(area=(-3.0, 0.0, -3.0, 3.0, -3.0, 3.0)), GAUSSIANS)
+    assert simulation.gaussians.count + simulation.still.count == 60
+    assert simulation.gaussians.count == (POINTS[:, 0] < 0).sum()
+
+
+def test_substep_divides_the_frame():
+    simulation = build(scene(), GAUSSIANS)
+    assert simulation.steps * simulation.dt == pytest.approx(0.01)
+
+
+def test_unknown_parameter_of_with():
+    with pytest.raises(InputError, match="youngs_modulus"):
+        build(scene(), GAUSSIANS).with_(young=3.0)
+
+
+def test_gradient_of_a_pixel_loss_is_the_central_difference():
+    simulation = build(scene(velocity=(0.0, 0.0, -1.0), spin=(3.0, 0.0, 0.0)), GAUSSIANS)
+    simulation = jax.tree.map(
+        lambda leaf: leaf.astype(jnp.float64) if leaf.dtype == jnp.float32 else leaf, simulation
+    )
+    camera = orbit((0.5, 0.5, 0.5), 1.2, 0.4, 0.2, width=24, height=16, dtype=jnp.float64)
+
+    @jax.jit
+    def loss(youngs_modulus, velocity):
+        changed = simulation.with_(youngs_modulus=youngs_modulus, velocity=velocity)
+        motion = rollout_frames(changed, 2)
+        image = draw(changed, motion.position[-1], motion.deformation[-1], camera, capacity=4096)
+        return jnp.mean((image.colour - 0.3) ** 2)
+
+    young, velocity = 1e3, jnp.array([0.0, 0.3, -1.0])
+    by_young, by_velocity = jax.jit(jax.grad(loss, argnums=(0, 1)))(young, velocity)
+    step = 1.0
+    difference = (loss(young + step, velocity) - loss(young - step, velocity)) / (2 * step)
+    assert float(by_young) == pytest.approx(float(difference), rel=2e-3) and by_young != 0
+    for axis in range(3):
+        nudge = jnp.zeros(3).at[axis].set(1e-5)
+        difference = (loss(young, velocity + nudge) - loss(young, velocity - nudge)) / 2e-5
+        assert float(by_velocity[axis]) == pytest.approx(float(difference), rel=2e-3, abs=1e-9)
