@@ -81,7 +81,7 @@ def sheet(text: np.ndarray, seed: int):
 
 
 def main() -> None:
-    options = arguments(__doc__, batch=128).parse_args()
+    options = arguments(__doc__, batch=64).parse_args()
     data = records.load(options.data)
     weight = data.weights()
     per_view = weight[data.item] / np.bincount(data.item, minlength=len(weight))[data.item]

@@ -85,7 +85,7 @@ def sheet(text: np.ndarray, seed: int, count: int = 2048):
 
 
 def main() -> None:
-    parser = arguments(__doc__, batch=64)
+    parser = arguments(__doc__, batch=32)
     parser.add_argument("--points", type=int, default=256, help="points a sample")
     options = parser.parse_args()
     data = records.load(options.data)

@@ -1,0 +1,98 @@
+"""Writes the averaged weights of a training run into the package, as bfloat16, with their facts.
+
+    python -m experiments.priors.export point_prior --run RUN --data PREPARED
+    python -m experiments.priors.export pixel_prior --run RUN --data PREPARED
+
+The manifest then holds what the run was: data, steps, seed, held-out error by noise level, command.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import orbax.checkpoint as ocp
+from flax import nnx
+from safetensors.flax import save_file
+
+from jaxphys import weights
+from jaxphys.guidance.pixel_prior import PixelPrior, PixelPriorConfig
+from jaxphys.guidance.point_prior import PointPrior, PointPriorConfig
+from jaxphys.guidance.priors import named_parameters
+
+KINDS = {
+    "point_prior": (PointPrior, PointPriorConfig, "train_points"),
+    "pixel_prior": (PixelPrior, PixelPriorConfig, "train_pixels"),
+}
+LICENCE = "Apache-2.0; trained on CC0, CC-BY 3.0 and MIT data, see the attribution file"
+DATA = (
+    "parametric models of experiments/priors/models, Debian sweethome3d-furniture 1.8 (CC0, CC-BY),"
+    " @lobehub/fluent-emoji-3d 1.1.0 (MIT; pixel prior only)"
+)
+
+
+def averaged(run: Path, names: list[str]) -> tuple[dict[str, np.ndarray], int]:
+    """The averaged weights of the newest checkpoint, and its step."""
+    with ocp.CheckpointManager(run.resolve() / "checkpoints") as manager:
+        step = manager.latest_step()
+        if step is None:
+            raise SystemExit(f"{run}: holds no checkpoint; train first")
+        state = manager.restore(step, args=ocp.args.StandardRestore())
+    average = state["average"] if isinstance(state, dict) else state.average
+    return {name: average[name] for name in names}, step
+
+
+def samples_seen(lines: list[dict], step: int) -> int:
+    """Samples drawn in `step` steps by a run whose pieces may have had different batch sizes."""
+    pieces = [(line["start"], line["options"]["batch"]) for line in lines if "start" in line]
+    ends = [start for start, _ in pieces[1:]] + [step]
+    return sum((end - start) * batch for (start, batch), end in zip(pieces, ends, strict=True))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name", choices=sorted(KINDS))
+    parser.add_argument("--run", type=Path, required=True)
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--folder", type=Path, default=weights.FOLDER)
+    options = parser.parse_args()
+    kind, config_type, script = KINDS[options.name]
+    config = config_type()
+    module = nnx.eval_shape(lambda: kind(config, rngs=nnx.Rngs(0)))
+    arrays, step = averaged(options.run, list(named_parameters(module)))
+    lines = [json.loads(line) for line in (options.run / "log.jsonl").read_text().splitlines()]
+    trained = [line["options"] for line in lines if "options" in line][-1]
+    report = [line for line in lines if "held_out" in line and line["step"] <= step][-1]
+    flags = " ".join(
+        f"--{key.replace('_', '-')} {trained[key]}"
+        for key in ("batch", "learning_rate", "seed", "points")
+        if key in trained
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "weights.safetensors"
+        save_file({n: jnp.asarray(a, jnp.bfloat16) for n, a in arrays.items()}, path)
+        entry = weights.register(
+            options.name,
+            path,
+            options.folder,
+            licence=LICENCE,
+            data=DATA,
+            records=json.loads((options.data / "summary.json").read_text()),
+            command=f"python -m experiments.priors.{script} --data PREPARED --run RUN {flags}",
+            config=asdict(config),
+            steps=step,
+            samples=samples_seen(lines, step),
+            seed=trained["seed"],
+            held_out=report["held_out"],
+            held_out_no_text=report["held_out_no_text"],
+        )
+    print(json.dumps(entry, indent=2))
+
+
+if __name__ == "__main__":
+    main()

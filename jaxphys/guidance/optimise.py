@@ -1,0 +1,334 @@
+"""From a sentence to 3D Gaussians: a cloud from the point prior, refined by score distillation.
+
+As GSGEN (Chen et al. 2024): points first, then Gaussians moved by the 2D and the 3D prior together.
+The 3D prior judges the centres in its own frame, which is the object's here: nothing is placed,
+turned or scaled before it is done.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from flax import nnx
+from scipy.spatial import cKDTree
+from tqdm import tqdm
+
+from jaxphys.core.errors import InputError
+from jaxphys.gaussians.density import DensityConfig, carry_moments, control_density, with_capacity
+from jaxphys.gaussians.gaussians import Gaussians, from_points, select, to_splats
+from jaxphys.gaussians.harmonics import dc_to_rgb
+from jaxphys.guidance import views
+from jaxphys.guidance.distillation import (
+    DistillationConfig,
+    image_distillation,
+    point_distillation,
+)
+from jaxphys.guidance.pixel_prior import PixelPrior
+from jaxphys.guidance.point_prior import PointPrior, SamplingConfig, sample_points
+from jaxphys.guidance.priors import load_pixel_prior, load_point_prior
+from jaxphys.guidance.text_encoder import load_text_encoder
+from jaxphys.render import Settings, look_at, next_capacity, render, required_pairs
+
+Array = jax.Array
+SETTINGS = Settings(tile_size=8)
+
+
+@dataclass(frozen=True)
+class OptimiseConfig:
+    """Choices of `text_to_gaussians`; lengths in object lengths.
+
+    Attributes:
+        count: Gaussians drawn from the point prior.
+        room: capacity for density control, as a multiple of `count`.
+        steps: of distillation; 0 leaves the sampled cloud as it is.
+        views: pictures a step.
+        sampling, image, point: of the cloud and the two distillations.
+        image_weight, point_weight, regular_weight: of the losses.
+        rates: learning rate by field of `Gaussians`, at the start; falls to a tenth.
+        size, opacity: Gaussians start with `size` times the distance to their nearest neighbours.
+        largest: standard deviations above are pulled back.
+        density_every: steps between two rounds of density control; 0 for none.
+    """
+
+    count: int = 2048
+    room: float = 1.25
+    steps: int = 240
+    views: int = 4
+    sampling: SamplingConfig = SamplingConfig()
+    image: DistillationConfig = DistillationConfig(
+        guidance=4.0, rescale=0.7, weight="clean", time=(0.05, 0.6, 0.3)
+    )
+    point: DistillationConfig = DistillationConfig(
+        guidance=3.0, rescale=0.7, weight="clean", time=(0.02, 0.4, 0.1)
+    )
+    image_weight: float = 1.0
+    point_weight: float = 0.5
+    regular_weight: float = 1.0
+    rates: tuple[tuple[str, float], ...] = (
+        ("means", 1e-3),
+        ("log_scales", 4e-3),
+        ("quaternions", 4e-3),
+        ("opacity_logits", 1e-2),
+        ("harmonics", 1e-2),
+    )
+    size: float = 0.6
+    opacity: float = 0.85
+    largest: float = 0.04
+    density_every: int = 80
+    density: DensityConfig = field(
+        default_factory=lambda: DensityConfig(
+            gradient_threshold=3.0, split_size=0.02, least_opacity=0.02, largest_size=0.15
+        )
+    )
+
+
+class OptimiseState(NamedTuple):
+    """All that the next step depends on: saved and restored, a run goes on to the same bytes."""
+
+    gaussians: Gaussians
+    alive: Array
+    optimiser: Any
+    pull: Array
+    step: Array
+
+
+class Guides(NamedTuple):
+    """The priors and what they are told: text (D,)."""
+
+    pixel: PixelPrior
+    point: PointPrior
+    text: Array
+
+
+def neighbour_sizes(points: np.ndarray, scale: float, largest: float) -> np.ndarray:
+    """(N,) standard deviations that close a surface sampled at `points` (N, 3): `scale` times the
+    mean distance to the three nearest neighbours, at most `largest`."""
+    near = min(4, len(points))
+    distance = cKDTree(points).query(points, k=near)[0].reshape(len(points), near)
+    mean = distance[:, 1:].mean(1) if near > 1 else np.full(len(points), largest)
+    return np.clip(scale * mean, 1e-3, largest).astype(np.float32)
+
+
+def initial_gaussians(guides: Guides, key: Array, config: OptimiseConfig) -> Gaussians:
+    """Gaussians at the points of a cloud drawn from the point prior."""
+    points, colours = sample_points(
+        guides.point, guides.text[None], key, count=config.count, config=config.sampling
+    )
+    sizes = neighbour_sizes(np.asarray(points[0]), config.size, config.largest)
+    return from_points(points[0], colours[0], sizes, opacity=config.opacity)
+
+
+def _transform(config: OptimiseConfig) -> optax.GradientTransformation:
+    steps = max(config.steps, 1)
+    groups = {
+        name: optax.adam(optax.exponential_decay(rate, steps, 0.1), eps=1e-15)
+        for name, rate in config.rates
+    }
+    labels = Gaussians(**{name: name for name, _ in config.rates})
+    return optax.multi_transform(groups, labels)
+
+
+def start(gaussians: Gaussians, config: OptimiseConfig) -> OptimiseState:
+    """The state before the first step."""
+    capacity = int(np.ceil(config.room * gaussians.count))
+    gaussians, alive = with_capacity(gaussians, capacity)
+    pull = jnp.zeros(capacity, gaussians.means.dtype)
+    return OptimiseState(
+        gaussians, alive, _transform(config).init(gaussians), pull, jnp.zeros((), jnp.int32)
+    )
+
+
+def draw_views(key: Array, count: int, dtype=jnp.float32) -> tuple[Array, Array]:
+    """(B,) azimuths spread around, elevations uniform over the sphere's trained band [rad]."""
+    first, second, third = jax.random.split(key, 3)
+    turn = (jnp.arange(count, dtype=dtype) + jax.random.uniform(first, (count,), dtype)) / count
+    azimuth = 2 * jnp.pi * (turn + jax.random.uniform(third, (), dtype))
+    low, high = (math.sin(elevation) for elevation in views.ELEVATIONS)
+    return azimuth, jnp.arcsin(jax.random.uniform(second, (count,), dtype, low, high))
+
+
+def draw(gaussians: Gaussians, azimuth: Array, elevation: Array, background, capacity: int | None):
+    """The picture (64, 64) of a view as the pixel prior was trained on it."""
+    eye = views.camera_position(azimuth, elevation, xp=jnp).astype(gaussians.means.dtype)
+    camera = look_at(
+        eye,
+        jnp.zeros_like(eye),
+        field_of_view=views.FIELD_OF_VIEW,
+        width=views.RESOLUTION,
+        height=views.RESOLUTION,
+    )
+    splats = to_splats(gaussians, eye)
+    return render(splats, camera, background=background, settings=SETTINGS, capacity=capacity)
+
+
+def _pairs(gaussians: Gaussians) -> int:
+    """Room for tile lists: twice what the neediest of a few views asks for."""
+    needs = []
+    for azimuth, elevation in ((0.0, 0.0), (1.6, 0.3), (0.8, 0.9)):
+        eye = jnp.asarray(views.camera_position(azimuth, elevation), gaussians.means.dtype)
+        camera = look_at(
+            eye,
+            jnp.zeros_like(eye),
+            field_of_view=views.FIELD_OF_VIEW,
+            width=views.RESOLUTION,
+            height=views.RESOLUTION,
+        )
+        needs.append(int(required_pairs(to_splats(gaussians, eye), camera, SETTINGS)))
+    return next_capacity(2 * max(needs))
+
+
+def regularity(gaussians: Gaussians, alive: Array, config: OptimiseConfig) -> Array:
+    """Mean penalty on large and needle-like Gaussians and on colours outside [0, 1]."""
+    large = jax.nn.relu(gaussians.log_scales - math.log(config.largest)) ** 2
+    needle = jnp.var(gaussians.log_scales, axis=1, keepdims=True)
+    colour = dc_to_rgb(gaussians.harmonics[:, 0])
+    outside = jax.nn.relu(colour - 1) ** 2 + jax.nn.relu(-colour) ** 2
+    return jnp.mean(jnp.where(alive[:, None], large + 0.02 * needle + outside, 0))
+
+
+@partial(nnx.jit, static_argnames=("config", "capacity"))
+def advance(
+    guides: Guides, state: OptimiseState, key: Array, config: OptimiseConfig, capacity: int
+) -> tuple[OptimiseState, Array]:
+    """One step of distillation. Returns the next state and whether a picture overflowed."""
+    key = jax.random.fold_in(key, state.step)
+    view_key, ground_key, image_key, point_key = jax.random.split(key, 4)
+    dtype = state.gaussians.means.dtype
+    azimuth, elevation = draw_views(view_key, config.views, dtype)
+    ground = jax.random.uniform(ground_key, (config.views, 3), dtype)
+    told = views.view_features(azimuth, elevation, xp=jnp)
+    text = jnp.broadcast_to(guides.text, (config.views, *guides.text.shape))
+    progress = state.step.astype(dtype) / max(config.steps, 1)
+
+    def loss(gaussians: Gaussians) -> tuple[Array, Array]:
+        def picture(view):
+            image = draw(gaussians, *view, capacity)
+            return image.colour, image.overflow
+
+        images, overflow = jax.lax.map(picture, (azimuth, elevation, ground))
+        image = image_distillation(
+            guides.pixel, images, text, told, image_key, config.image, progress
+        )
+        # Only what is alive at the start is judged in 3D; what density control adds lies close by.
+        point = point_distillation(
+            guides.point,
+            gaussians.means[: config.count],
+            dc_to_rgb(gaussians.harmonics[: config.count, 0]),
+            guides.text,
+            point_key,
+            config.point,
+            progress,
+        )
+        value = config.image_weight * image.value / images[0].size
+        value = value + config.point_weight * point.value / (6 * config.count)
+        value = value + config.regular_weight * regularity(gaussians, state.alive, config)
+        return value, overflow.any()
+
+    gradient, overflow = jax.grad(loss, has_aux=True)(state.gaussians)
+    gradient = jax.tree.map(
+        lambda g: jnp.where(state.alive.reshape(-1, *(1,) * (g.ndim - 1)), g, 0), gradient
+    )
+    updates, optimiser = _transform(config).update(gradient, state.optimiser, state.gaussians)
+    gaussians = optax.apply_updates(state.gaussians, updates)
+    pull = state.pull + jnp.linalg.norm(gradient.means, axis=1)
+    return state._replace(
+        gaussians=gaussians, optimiser=optimiser, pull=pull, step=state.step + 1
+    ), overflow
+
+
+@partial(jax.jit, static_argnames="config")
+def adapt(state: OptimiseState, key: Array, config: OptimiseConfig) -> OptimiseState:
+    """Density control; gradients count relative to their mean, so that no unit enters."""
+    mean = jnp.sum(state.pull) / jnp.maximum(jnp.sum(state.alive), 1)
+    relative = state.pull / jnp.maximum(mean, jnp.finfo(mean.dtype).tiny)
+    key = jax.random.fold_in(key, state.step)
+    update = control_density(state.gaussians, state.alive, relative, key, config.density)
+    return state._replace(
+        gaussians=update.gaussians,
+        alive=update.alive,
+        optimiser=carry_moments(update, state.optimiser),
+        pull=jnp.zeros_like(state.pull),
+    )
+
+
+def optimise(
+    guides: Guides,
+    state: OptimiseState,
+    key: Array,
+    config: OptimiseConfig,
+    *,
+    progress: bool = False,
+    on_step: Callable[[OptimiseState], None] | None = None,
+) -> OptimiseState:
+    """Steps from `state` to the end; `on_step` sees every new state, to save or show it."""
+    capacity = _pairs(state.gaussians)
+    bar = tqdm(
+        total=config.steps,
+        initial=int(state.step),
+        desc="distil",
+        disable=not progress,
+        leave=False,
+    )
+    with bar:
+        while int(state.step) < config.steps:
+            following, overflow = advance(guides, state, key, config, capacity)
+            if overflow:
+                capacity = next_capacity(capacity + 1)
+                continue
+            state = following
+            step = int(state.step)
+            if config.density_every and step % config.density_every == 0 and step < config.steps:
+                state = adapt(state, key, config)
+            if on_step is not None:
+                on_step(state)
+            bar.update()
+    return state
+
+
+def text_to_gaussians(
+    prompt: str,
+    *,
+    seed: int = 0,
+    steps: int | None = None,
+    count: int | None = None,
+    progress: bool = False,
+    config: OptimiseConfig = OptimiseConfig(),
+    resume: OptimiseState | None = None,
+    on_step: Callable[[OptimiseState], None] | None = None,
+) -> Gaussians:
+    """Gaussians of what `prompt` describes: centred, z up, front +x, longest side about 1.
+
+    Args:
+        prompt: refined text, see `refine`; its first comma-separated part names the object.
+        seed: the same seed gives the same Gaussians on the same device.
+        steps, count: override `config`.
+        progress: show a bar.
+        resume: a state that `on_step` was given: go on from there.
+        on_step: called with the state after each step.
+
+    Raises:
+        InputError: nothing to draw, or the bundled weights are missing or damaged.
+    """
+    if not prompt.strip():
+        raise InputError("prompt is empty: say what to make, for example 'a strawberry'")
+    changes = {"steps": steps, "count": count}
+    config = replace(config, **{k: v for k, v in changes.items() if v is not None})
+    if config.count < 1:
+        raise InputError(f"count = {config.count}: needs at least one Gaussian")
+    encoder = load_text_encoder()
+    text = jnp.asarray(encoder([prompt.split(",")[0].strip()])[0], jnp.float32)
+    guides = Guides(load_pixel_prior()[0], load_point_prior()[0], text)
+    cloud_key, step_key = jax.random.split(jax.random.key(seed))
+    state = resume
+    if state is None:
+        state = start(initial_gaussians(guides, cloud_key, config), config)
+    state = optimise(guides, state, step_key, config, progress=progress, on_step=on_step)
+    return select(state.gaussians, np.flatnonzero(np.asarray(state.alive)))

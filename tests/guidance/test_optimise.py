@@ -1,0 +1,97 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from flax import nnx
+
+from jaxphys.core.errors import InputError
+from jaxphys.gaussians.gaussians import from_points
+from jaxphys.guidance.optimise import (
+    Guides,
+    OptimiseConfig,
+    draw,
+    draw_views,
+    neighbour_sizes,
+    optimise,
+    start,
+    text_to_gaussians,
+)
+from jaxphys.guidance.pixel_prior import PixelPrior, PixelPriorConfig
+from jaxphys.guidance.point_prior import PointPrior, PointPriorConfig
+from jaxphys.guidance.views import ELEVATIONS
+
+CONFIG = OptimiseConfig(count=24, room=1.5, steps=4, views=2, density_every=2)
+
+
+@pytest.fixture(scope="module")
+def guides():
+    pixel = PixelPriorConfig(
+        patch=16, text=12, width=32, layers=1, head_width=16, hidden=32, rank=4
+    )
+    point = PointPriorConfig(
+        text=12,
+        width=32,
+        latents=8,
+        latent_width=32,
+        blocks=1,
+        latent_layers=1,
+        head_width=16,
+        hidden=32,
+        latent_hidden=32,
+        rank=4,
+    )
+    text = jnp.ones(12, jnp.float32) / 12**0.5
+    return Guides(PixelPrior(pixel, rngs=nnx.Rngs(0)), PointPrior(point, rngs=nnx.Rngs(0)), text)
+
+
+def cloud():
+    rng = np.random.default_rng(0)
+    points = jnp.asarray(rng.uniform(-0.4, 0.4, (24, 3)), jnp.float32)
+    return from_points(points, jnp.asarray(rng.uniform(size=(24, 3)), jnp.float32), 0.03)
+
+
+def test_resumed_run_ends_in_the_same_bytes(guides):
+    key, states = jax.random.key(0), []
+    through = optimise(guides, start(cloud(), CONFIG), key, CONFIG, on_step=states.append)
+    assert [int(s.step) for s in states] == [1, 2, 3, 4]
+    resumed = optimise(guides, states[1], key, CONFIG)
+    for a, b in zip(jax.tree.leaves(through), jax.tree.leaves(resumed), strict=True):
+        np.testing.assert_array_equal(a, b)
+    before, after = start(cloud(), CONFIG).gaussians, through.gaussians
+    assert all(np.isfinite(leaf).all() for leaf in jax.tree.leaves(after))
+    assert np.abs(after.means - before.means).max() > 1e-4
+    assert after.means.dtype == jnp.float32
+    assert after.count == 36 and int(through.alive.sum()) >= 24
+
+
+def test_front_is_seen_from_azimuth_zero():
+    """A red dot at the front (+x), a green one at +y, a blue one above."""
+    dots = from_points(jnp.eye(3, dtype=jnp.float32) * 0.4, jnp.eye(3), 0.02, opacity=0.99)
+    front = np.asarray(draw(dots, jnp.float32(0), jnp.float32(0), jnp.zeros(3), None).colour)
+    row, column = np.unravel_index(front[..., 1].argmax(), (64, 64))
+    assert abs(row - 32) <= 1 and column > 38  # +y is to the right of who looks along -x
+    row, column = np.unravel_index(front[..., 2].argmax(), (64, 64))
+    assert abs(column - 32) <= 1 and row < 26
+    side = np.asarray(draw(dots, jnp.float32(np.pi / 2), jnp.float32(0), jnp.zeros(3), None).colour)
+    assert np.unravel_index(side[..., 0].argmax(), (64, 64))[1] < 26
+
+
+def test_views_cover_the_trained_band():
+    azimuth, elevation = draw_views(jax.random.key(1), 400)
+    assert np.ptp(azimuth % (2 * np.pi)) > 6.2
+    assert ELEVATIONS[0] <= elevation.min() and elevation.max() <= ELEVATIONS[1]
+    np.testing.assert_allclose(np.sin(elevation).mean(), np.sin(ELEVATIONS).mean(), atol=0.05)
+
+
+def test_neighbour_sizes():
+    line = np.stack([np.arange(6) * 0.02, np.zeros(6), np.zeros(6)], 1)
+    np.testing.assert_allclose(neighbour_sizes(line, 0.5, 1.0)[2:4], 0.5 * 0.08 / 3, rtol=1e-5)
+    np.testing.assert_allclose(neighbour_sizes(line[:1], 0.5, 0.04), 0.02)
+    np.testing.assert_allclose(neighbour_sizes(np.zeros((5, 3)), 0.5, 0.04), 1e-3)
+
+
+def test_empty_requests_are_refused():
+    with pytest.raises(InputError, match="empty"):
+        text_to_gaussians("  ")
+    with pytest.raises(InputError, match="at least one"):
+        text_to_gaussians("a can", count=0)
