@@ -194,9 +194,9 @@ def attribution(entries: list[Entry]) -> str:
     ]
     lines += [
         "",
-        "Pictures of the Fluent 3D emoji (Microsoft, MIT licence) were also among the training data, with",
-        "names from emojibase (MIT licence). The text encoder is all-MiniLM-L6-v2 by the authors of",
-        "sentence-transformers (Apache-2.0), quantised.",
+        "Pictures of the Fluent 3D emoji (Microsoft, MIT licence) were also among the training",
+        "data, with names from emojibase (MIT licence). The text encoder is all-MiniLM-L6-v2 by",
+        "the authors of sentence-transformers (Apache-2.0), quantised.",
     ]
     return "\n".join(lines) + "\n"
 

@@ -25,21 +25,27 @@ def camera_frame(direction: np.ndarray) -> np.ndarray:
 def nearest_points(points, position, resolution: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The index of the nearest point per pixel (-1: none), and every point's pixel and depth.
 
-    A camera at `position` (3,) looking at the origin with the field of view of `views`.
+    A camera at `position` (3,) looking at the origin with the field of view of `views`. Each point
+    covers the two by two pixels whose centres are nearest, so that samples leave no gaps.
     """
     frame = camera_frame(position)
     x, y, depth = ((points - position) @ frame.T.astype(points.dtype)).T
     focal = 0.5 * resolution / np.tan(0.5 * views.FIELD_OF_VIEW)
-    column = np.floor(focal * x / depth + 0.5 * resolution).astype(np.int64)
-    row = np.floor(focal * y / depth + 0.5 * resolution).astype(np.int64)
-    pixel = row * resolution + column
-    inside = (column >= 0) & (column < resolution) & (row >= 0) & (row < resolution)
+    u, v = focal * x / depth + 0.5 * resolution, focal * y / depth + 0.5 * resolution
     # Depth in the high bits and the index in the low ones: one minimum finds both.
     key = (depth * 2**24).astype(np.int64) << 32 | np.arange(len(points))
-    buffer = np.full(resolution**2, np.iinfo(np.int64).max)
-    np.minimum.at(buffer, pixel[inside], key[inside])
-    index = np.where(buffer == np.iinfo(np.int64).max, -1, buffer & 0xFFFFFFFF)
-    return index, np.where(inside, pixel, -1), depth
+    empty = np.iinfo(np.int64).max
+    buffer = np.full((resolution + 2) ** 2, empty)
+    # A border of one pixel takes what falls beside the picture.
+    left = np.clip(np.floor(u + 0.5).astype(np.int64), 0, resolution)
+    top = np.clip(np.floor(v + 0.5).astype(np.int64), 0, resolution)
+    for row in (0, 1):
+        for column in (0, 1):
+            np.minimum.at(buffer, (top + row) * (resolution + 2) + left + column, key)
+    buffer = buffer.reshape(resolution + 2, resolution + 2)[1:-1, 1:-1].ravel()
+    inside = (u >= 0) & (u < resolution) & (v >= 0) & (v < resolution)
+    pixel = np.floor(v).astype(np.int64) * resolution + np.floor(u).astype(np.int64)
+    return np.where(buffer == empty, -1, buffer & 0xFFFFFFFF), np.where(inside, pixel, -1), depth
 
 
 def visible_surface(points, normals, *, directions: int = 24, resolution: int = 64):
@@ -53,7 +59,10 @@ def visible_surface(points, normals, *, directions: int = 24, resolution: int = 
     for direction in golden_directions(directions):
         position = (views.DISTANCE * direction).astype(points.dtype)
         index, pixel, depth = nearest_points(points, position, resolution)
-        front = np.where(index >= 0, depth[index], np.inf)
+        front = np.where(index >= 0, depth[index], np.inf).reshape(resolution, resolution)
+        hole, nearer = pinholes(front)
+        around = np.where(nearer, neighbours(front), 0).sum(0)
+        front = np.where(hole, around / np.maximum(nearer.sum(0), 1), front).ravel()
         near = (pixel >= 0) & (depth < front[pixel] + 0.02)
         seen += near
         offset = position - points[near]
@@ -73,29 +82,34 @@ def picture(points, colours, azimuth: float, elevation: float) -> np.ndarray:
     """The points seen from a view: RGBA uint8 (64, 64, 4), straight alpha, antialiased."""
     size = views.RESOLUTION * SUPERSAMPLING
     position = views.camera_position(azimuth, elevation).astype(points.dtype)
-    index, _, _ = nearest_points(points, position, size)
+    index, _, depth = nearest_points(points, position, size)
     alpha = (index >= 0).astype(np.float32)[:, None]
     premultiplied = np.concatenate([colours[index] * alpha, alpha], 1).reshape(size, size, 4)
-    premultiplied = close_pinholes(premultiplied)
+    hole, nearer = pinholes(np.where(index >= 0, depth[index], np.inf).reshape(size, size))
+    around = (neighbours(premultiplied) * nearer[..., None]).sum(0)
+    premultiplied = np.where(
+        hole[..., None], around / np.maximum(nearer.sum(0), 1)[..., None], premultiplied
+    )
     shape = (views.RESOLUTION, SUPERSAMPLING, views.RESOLUTION, SUPERSAMPLING, 4)
     return straight(premultiplied.reshape(shape).mean((1, 3)))
 
 
-def close_pinholes(image: np.ndarray) -> np.ndarray:
-    """Fills pixels that no point fell on but most of whose eight neighbours are covered by their
-    mean.
-    """
-    padded = np.pad(image, ((1, 1), (1, 1), (0, 0)))
+def neighbours(image: np.ndarray) -> np.ndarray:
+    """The eight neighbours (8, H, W, ...) of every pixel; those past the border repeat the edge."""
     height, width = image.shape[:2]
-    around = sum(
-        padded[i : i + height, j : j + width]
-        for i in range(3)
-        for j in range(3)
-        if (i, j) != (1, 1)
-    )
-    count = around[..., 3:]
-    hole = (image[..., 3:] == 0) & (count >= 5)
-    return np.where(hole, around / np.maximum(count, 1), image)
+    padded = np.pad(image, ((1, 1), (1, 1), *[(0, 0)] * (image.ndim - 2)), mode="edge")
+    shifts = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
+    return np.stack([padded[i : i + height, j : j + width] for i, j in shifts])
+
+
+def pinholes(depth: np.ndarray, step: float = 0.04) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels of `depth` (H, W) where the samples let something behind show through.
+
+    Those with most of their neighbours nearer by `step` object lengths (infinite depth: nothing).
+    Returns the mask (H, W) and which neighbours (8, H, W) are the nearer ones.
+    """
+    nearer = neighbours(depth) < depth - step
+    return nearer.sum(0) >= 5, nearer
 
 
 def straight(premultiplied: np.ndarray) -> np.ndarray:
