@@ -7,10 +7,10 @@ import zlib
 
 import numpy as np
 
-from . import dishes, plants, sweets, things
+from . import dishes, plants, simple, sweets, things
 from .surfaces import Mesh, normalise
 
-MODELS = {**sweets.MODELS, **dishes.MODELS, **plants.MODELS, **things.MODELS}
+MODELS = {**sweets.MODELS, **dishes.MODELS, **plants.MODELS, **things.MODELS, **simple.MODELS}
 
 # The objects a user is most likely to ask for first: they get many more variants than the others.
 PRINCIPAL = (
