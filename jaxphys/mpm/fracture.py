@@ -1,5 +1,5 @@
-"""Fracture: a law that loses its tension for good once stretched too far, and a count of the pieces
-it leaves.
+"""Fracture: a law that loses its tension for good once stretched too far and crumbles where it is
+broken, and a count of the pieces it leaves.
 """
 
 import jax.numpy as jnp
@@ -18,7 +18,7 @@ from jaxphys.mpm.elasticity import (
     lame,
 )
 from jaxphys.mpm.law import Law, Parameters
-from jaxphys.mpm.plasticity import apply_change
+from jaxphys.mpm.plasticity import apply_change, drucker_prager_values, friction_coefficient
 
 
 def damage_of_strain(strain: Array, fracture_strain: Array, softening_strain: Array) -> Array:
@@ -29,7 +29,8 @@ def damage_of_strain(strain: Array, fracture_strain: Array, softening_strain: Ar
     """
     end = fracture_strain + softening_strain
     reached = jnp.clip(strain, fracture_strain, end)
-    return 1 - (fracture_strain / reached) * (end - reached) / softening_strain
+    carried = (fracture_strain / reached) * (end - reached) / softening_strain
+    return 1 - jnp.minimum(carried, 1)
 
 
 def _tension_and_compression(e: Array):
@@ -37,45 +38,54 @@ def _tension_and_compression(e: Array):
     return jnp.maximum(e, 0), jnp.minimum(e, 0), jnp.maximum(total, 0), jnp.minimum(total, 0)
 
 
-def fracture_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple[Array]]:
+def fracture_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
     """Damage and stress in principal log strains (3, ...), for `left_isotropic`.
 
     Damage never decreases. It takes away the share of the stress that resists stretching (e > 0,
     tr(e) > 0) and leaves the share that resists compression (the spectral split of Miehe et al.
-    2010, eq. 28), so broken faces still push. Strain beyond the end of softening opens a gap
-    instead of being stored.
+    2010, eq. 28), so faces of a closing crack still push.
+
+    At damage 1 the particle is rubble: sand, with the log volume by which it has opened kept, so
+    that a crack must close before it pushes. Stress that came back at the first turn of the strain
+    would pump energy, and volume, out of every cycle.
 
     Args:
         e: trial log strains.
-        arguments: mu, lambda [Pa], fracture strain, softening strain, damage, each (...).
+        arguments: mu, lambda [Pa], fracture strain, softening strain, alpha of
+            `friction_coefficient`, damage, and the kept log volume, each (...).
 
     Returns:
-        (exp(change) - 1, principal Kirchhoff stress [Pa]), (the new damage,).
+        (exp(change) - 1, principal Kirchhoff stress [Pa]), (damage, kept log volume), both new.
     """
-    mu, lam, fracture_strain, softening_strain, damage = arguments
+    mu, lam, fracture_strain, softening_strain, alpha, damage, kept_volume = arguments
     largest = jnp.maximum(jnp.maximum(e[0], e[1]), e[2])
     damage = jnp.maximum(damage, damage_of_strain(largest, fracture_strain, softening_strain))
-    opened = jnp.maximum(e - (fracture_strain + softening_strain), 0)
-    stretch, squeeze, swelling, shrinking = _tension_and_compression(e - opened)
+    stretch, squeeze, swelling, shrinking = _tension_and_compression(e)
     stress = (1 - damage) * (2 * mu * stretch + lam * swelling) + (
         2 * mu * squeeze + lam * shrinking
     )
-    return (jnp.expm1(-opened), stress), (damage,)
-
-
-def _arguments(parameters: Parameters, damage: Array):
-    return (
-        *lame(parameters),
-        parameters["fracture_strain"],
-        parameters["softening_strain"],
+    (rubble_change, rubble_stress), (volume,) = drucker_prager_values(
+        e, (mu, lam, alpha, kept_volume)
+    )
+    broken = damage >= 1
+    change = jnp.where(broken, rubble_change, 0)
+    return (change, jnp.where(broken, rubble_stress, stress)), (
         damage,
+        jnp.where(broken, volume, 0),
     )
 
 
 def _fracture_update(parameters: Parameters, F_trial: Array, history: Array):
-    arguments = _arguments(parameters, history[0])
-    (change, stress), (damage,) = left_isotropic(fracture_values, F_trial, arguments)
-    return apply_change(change, F_trial), stress, damage[None]
+    arguments = (
+        *lame(parameters),
+        parameters["fracture_strain"],
+        parameters["softening_strain"],
+        friction_coefficient(parameters["friction_angle"]),
+        history[0],
+        history[1],
+    )
+    (change, stress), kept = left_isotropic(fracture_values, F_trial, arguments)
+    return apply_change(change, F_trial), stress, jnp.stack(kept)
 
 
 def _damaged_energy_value(e, arguments):
@@ -96,9 +106,14 @@ def damaged_energy(parameters: Parameters, F: Array, damage: Array) -> Array:
 
 FRACTURE = Law(
     name="fracture",
-    parameters=(*ELASTIC_PARAMETERS, "fracture_strain", "softening_strain"),
-    history=(0.0,),
-    history_names=("damage",),
+    parameters=(
+        *ELASTIC_PARAMETERS,
+        "fracture_strain",
+        "softening_strain",
+        "friction_angle",
+    ),
+    history=(0.0, 0.0),
+    history_names=("damage", "kept_log_volume"),
     update=_fracture_update,
     energy=hencky_energy,
     principal_energy=hencky_principal_energy,

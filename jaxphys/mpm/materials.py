@@ -112,6 +112,7 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
                 density=1000.0,
                 fracture_strain=0.05,
                 softening_strain=0.1,
+                friction_angle=30.0,
             ),
         )
     }
