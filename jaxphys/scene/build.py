@@ -195,8 +195,7 @@ def build_with_bounds(
     ]
     described = [(get_material(p.thing.material), p.values(), len(p.positions)) for p in parts]
     parameters, density, segments = assemble_parameters(described)
-    # The total gradient is needed wherever a law is plastic: bent metal must stay bent.
-    config = Config(grid, segments, track_total=True)
+    config = Config(grid, segments, track_total=scene.splats_follow == "total")
     positions = np.concatenate([part.positions for part in parts]).astype(np.float32)
     motions = [part.motion() for part in parts]
     state = initial_state(

@@ -5,16 +5,26 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
+from scipy.spatial import cKDTree
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.rotations import axis_angle_to_matrix
 from jaxphys.gaussians.filling import FillingConfig, fill_interior
-from jaxphys.gaussians.gaussians import Gaussians, opacities, select, transform
+from jaxphys.gaussians.gaussians import (
+    Gaussians,
+    concatenate,
+    from_points,
+    opacities,
+    select,
+    transform,
+)
+from jaxphys.gaussians.harmonics import dc_to_rgb
 from jaxphys.gaussians.relax import blue_noise
 from jaxphys.mpm.grid import Grid
 from jaxphys.scene.scene import Object
 
 RELAX_STEPS = 40
+SIZE_OVER_SPACING = 0.4
 
 
 class Placed(NamedTuple):
@@ -75,7 +85,18 @@ def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str, seed: int
     moving = select(placed, np.flatnonzero(chosen))
     _require_inside(np.asarray(moving.means), grid, where)
     still = select(placed, np.flatnonzero(~chosen))
-    return Placed(moving, still, _fill(moving, thing, grid, seed, where))
+    filling = _fill(moving, thing, grid, seed, where)
+    if thing.filling is not None and thing.filling.show and len(filling):
+        moving, filling = concatenate([moving, _shown(filling, moving, thing, grid)]), filling[:0]
+    return Placed(moving, still, filling)
+
+
+def _shown(points: np.ndarray, moving: Gaussians, thing: Object, grid: Grid) -> Gaussians:
+    """Round Gaussians at the filling's points, in the colours of those nearest to them."""
+    _, nearest = cKDTree(np.asarray(moving.means)).query(points)
+    colours = np.asarray(dc_to_rgb(moving.harmonics[:, 0]))[nearest]
+    spacing = (thing.filling.spacing or grid.spacing / 2) / thing.filling.per_cell ** (1 / 3)
+    return from_points(points, colours, SIZE_OVER_SPACING * spacing)
 
 
 def _numbers(values) -> str:

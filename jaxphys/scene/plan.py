@@ -85,7 +85,9 @@ def _parts(scene: Scene, simulation: Simulation) -> tuple[dict[str, str], dict[s
         "second deformation gradient",
         simulation.config.keeps_total,
         "plastic flow must be seen in the splats",
-        "elastic and total deformation are the same",
+        "elastic and total deformation are the same"
+        if not plastic
+        else "splats follow the elastic one",
     )
     decide("history", simulation.config.history_rows > 0, "a law remembers", "no law remembers")
     for i, boundary in enumerate(scene.boundaries):

@@ -5,6 +5,7 @@ in degrees.
 """
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from jaxphys.core.errors import InputError
 from jaxphys.scene.boundaries import Boundary, Vector
@@ -61,6 +62,8 @@ class Filling(_Checked):
         area: (x0, x1, y0, y1, z0, z1) in the domain [m]; null: everywhere.
         smooth: smooth the density field first.
         relax: spread the new particles evenly (blue noise).
+        show: draw them too, each as a round Gaussian in the colour of the nearest one, for objects
+            that come apart.
     """
 
     spacing: float | None = field(default=None, metadata=POSITIVE)
@@ -74,6 +77,7 @@ class Filling(_Checked):
     area: Area | None = None
     smooth: bool = False
     relax: bool = True
+    show: bool = False
 
 
 @dataclass(frozen=True)
@@ -218,6 +222,9 @@ class Scene(_Checked):
         width, height: of the pictures [pixels].
         background: red, green, blue in [0, 1].
         ground: null draws none.
+        splats_follow: "total" stretches splats with all of the deformation, so that bent metal
+            stays
+            bent; "elastic" leaves out plastic flow, so that grains stay grains.
         regularise_colours: normalise and clamp colours, with one range for each object.
         seed: of every random choice.
         generation: where the first object comes from, if from a sentence.
@@ -238,6 +245,7 @@ class Scene(_Checked):
     height: int = field(default=1090, metadata=between(8, 8192))
     background: Vector = field(default=(1.0, 1.0, 1.0), metadata=between(0, 1))
     ground: Ground | None = None
+    splats_follow: Literal["total", "elastic"] = "total"
     regularise_colours: bool = True
     seed: int = field(default=0, metadata=between(0, 2**31 - 1))
     generation: Generation | None = None
