@@ -106,7 +106,7 @@ def _fracture(spacing: float) -> Scene:
     for axis, offset in enumerate((0.06, -0.05, 0.04)):
         place, half_size = list(centre), [size] * 3
         place[axis] += offset * size
-        half_size[axis] = 0.6 * spacing
+        half_size[axis] = 1.0 * spacing
         flaws.append(
             Region(
                 tuple(place), tuple(half_size), {"fracture_strain": 5e-3, "softening_strain": 0.02}
@@ -117,13 +117,13 @@ def _fracture(spacing: float) -> Scene:
         parameters={
             "youngs_modulus": 8e5,
             "density": 500.0,
-            "fracture_strain": 0.15,
-            "softening_strain": 0.2,
+            "fracture_strain": 0.08,
+            "softening_strain": 0.1,
         },
         regions=tuple(flaws),
         size=size,
         centre=centre,
-        velocity=(0.0, 0.0, -3.0),
+        velocity=(0.0, 0.0, -4.0),
         rotation=(Rotation((1.0, 0.0, 0.0), 20.0),),
         filling=Filling(show=True),
     )
