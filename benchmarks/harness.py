@@ -1,8 +1,8 @@
 """One fresh process per case and round, methods of a case in turn; medians over the processes.
 
-Process-level medians carry the variance that matters (memory layout, frequency, scheduling), so the line holds the median over rounds,
-the spread between rounds, and every raw sample. A method that fails is a line with a status, not a
-missing line.
+Process-level medians carry the variance that matters (memory layout, frequency, scheduling), so the
+line holds the median over rounds, the spread between rounds, and every raw sample. A method that
+fails is a line with a status, not a missing line.
 """
 
 import json

@@ -148,7 +148,7 @@ def _concrete(value: Array):
     """The number behind `value`, also under `jax.grad`; not inside `jax.jit`."""
     try:
         return np.asarray(lax.stop_gradient(value)).item()
-    except jax.errors.ConcretizationTypeError as error:
+    except (jax.errors.ConcretizationTypeError, jax.errors.TracerArrayConversionError) as error:
         raise InputError(
             "render inside jax.jit, jax.vmap or jax.lax.map: give capacity=, for example "
             "next_capacity(required_pairs(...)) from outside"
