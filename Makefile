@@ -21,7 +21,7 @@ demo: $(VENV)/installed
 	$(BIN)/jaxphys generate "a strawberry" --material jelly --out outputs/demo
 
 test: $(VENV)/installed-test
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
 
 test-slow: $(VENV)/installed-test
 	$(BIN)/python -m pytest -m slow

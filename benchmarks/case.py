@@ -15,6 +15,7 @@ class Prepared:
             compile.
         error: evaluated once after the timings; its meaning is the suite's, None where there is no
             reference.
+        once: time the first call and no other: for whole runs, in which compiling counts.
         extra: anything else worth a field of the line.
     """
 
@@ -22,6 +23,7 @@ class Prepared:
     work: float
     compile_seconds: float | None = None
     error: Callable[[], float] | None = None
+    once: bool = False
     extra: Mapping[str, object] = field(default_factory=dict)
 
 

@@ -1,14 +1,27 @@
-"""MLS-MPM throughput: a block of random particles, eight per cell, in a fixed grid.
+"""Suite 'mpm': a block of random particles, eight per cell, in a fixed grid.
 
-Plain functions: they build the case and return something to time. Our side and the peer in
-`benchmarks/peers/taichi_mpm.py` get the same particles in the same (sorted) order.
+Our side and the peer in `benchmarks/peers/taichi_mpm.py` get the same particles in the same
+(sorted) order. Work is counted in particle-steps.
 """
 
+import time
 from functools import partial
 
 import numpy as np
 
-LAWS = ("neo-Hookean", "fixed corotated")
+from benchmarks.case import Case, Prepared
+
+# name: (jaxphys law, parameters beside the elastic ones). The peer knows the first two.
+LAWS = {
+    "neo-Hookean": ("elasticity.NEO_HOOKEAN", {}),
+    "fixed corotated": ("elasticity.FIXED_COROTATED", {}),
+    "metal": ("plasticity.VON_MISES", {"yield_stress": 1e3, "hardening": 0.0}),
+    "sand": ("plasticity.DRUCKER_PRAGER", {"friction_angle": 35.0}),
+}
+PEER_LAWS = ("neo-Hookean", "fixed corotated")
+# case: (cells a side of the block, nodes a side of the grid, steps in a call)
+SIZES = {"64k": (20, 64, 10), "262k": (32, 128, 4)}
+QUICK_SIZES = {"8k": (10, 32, 10)}
 
 
 def block_case(cells: int, nodes: int, law: str = "neo-Hookean", seed: int = 0) -> dict:
@@ -45,22 +58,24 @@ def model_and_state(case: dict, window: int | None = None):
     """(config, model, state) of a `block_case` in float32; window: nodes per axis, None for all."""
     import jax.numpy as jnp
 
-    from jaxphys.mpm.elasticity import FIXED_COROTATED, NEO_HOOKEAN
+    from jaxphys.mpm import elasticity, plasticity
     from jaxphys.mpm.grid import Grid
     from jaxphys.mpm.state import Config, Model, initial_state
 
     count = len(case["position"])
-    law = dict(zip(LAWS, (NEO_HOOKEAN, FIXED_COROTATED), strict=True))[case["law"]]
+    name, more = LAWS[case["law"]]
+    module, attribute = name.split(".")
+    law = getattr({"elasticity": elasticity, "plasticity": plasticity}[module], attribute)
     grid = Grid((case["nodes"],) * 3, case["spacing"])
     config = Config(grid, ((law, 0, count),), window=None if window is None else (window,) * 3)
 
     def full(name):
-        return jnp.full(count, case[name], jnp.float32)
+        return jnp.full(count, {**case, **more}[name], jnp.float32)
 
     model = Model(
         mass=full("mass"),
         volume=full("volume"),
-        parameters={name: full(name) for name in ("youngs_modulus", "poisson_ratio")},
+        parameters={name: full(name) for name in law.parameters},
         gravity=jnp.array([0.0, 0.0, -9.8], jnp.float32),
     )
     state = initial_state(config, case["position"], case["velocity"], dtype=jnp.float32)
@@ -98,3 +113,45 @@ def value_and_gradient(case: dict, steps: int, adjoint=None, window: int | None 
 
     run = jax.jit(jax.value_and_grad(loss))
     return partial(run, model.parameters["youngs_modulus"], model, state)
+
+
+def compiled(run) -> float:
+    """Seconds until a `partial` of a jitted function is compiled; its first call then is free."""
+    start = time.perf_counter()
+    run.func.lower(*run.args).compile()
+    return time.perf_counter() - start
+
+
+def prepare(law: str, cells: int, nodes: int, steps: int) -> Prepared:
+    """Our solver, `steps` steps a call."""
+    import jax
+
+    run = forward(block_case(cells, nodes, law), steps)
+    return Prepared(
+        lambda: jax.block_until_ready(run()),
+        work=8 * cells**3 * steps,
+        compile_seconds=compiled(run),
+        extra={"steps": steps},
+    )
+
+
+def prepare_peer(law: str, cells: int, nodes: int, steps: int) -> Prepared:
+    """Taichi's CPU backend on two threads, `steps` steps a call."""
+    from benchmarks.peers.taichi_mpm import build
+
+    advance, _ = build(block_case(cells, nodes, law))
+    return Prepared(lambda: advance(steps), work=8 * cells**3 * steps, extra={"steps": steps})
+
+
+def cases(quick: bool) -> list[Case]:
+    """Each law on each size, beside the peer where it knows the law."""
+    found = []
+    for size, (cells, nodes, steps) in (QUICK_SIZES if quick else SIZES).items():
+        for law in LAWS:
+            name = f"{law.lower().replace(' ', '-')}-{size}"
+            arguments = (law, cells, nodes, steps)
+            numbers = {"particles": 8 * cells**3, "nodes": nodes**3}
+            found.append(Case(name, "jaxphys", partial(prepare, *arguments), numbers))
+            if law in PEER_LAWS:
+                found.append(Case(name, "taichi", partial(prepare_peer, *arguments), numbers))
+    return found

@@ -1,4 +1,4 @@
-"""Scenes for timing the renderer: plain functions, without a harness.
+"""Suite 'render': value, and value and gradient, of one large and many small pictures.
 
 `ball` is the picture that the cost of rasterisation is quoted for: 100,000 splats on a ball a third
 of a 1958 x 1090 image wide, some 445,000 pairs of splat and 16 x 16 tile. `thumbnail` is what score
@@ -6,13 +6,24 @@ distillation renders at every step: a few thousand splats at 64 x 64, from sever
 """
 
 import math
+import time
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
+from benchmarks.case import Case, Prepared
 from jaxphys.core.splats import Splats
-from jaxphys.render import Camera, Settings, look_at, orbit, render
+from jaxphys.render import (
+    Camera,
+    Settings,
+    look_at,
+    next_capacity,
+    orbit,
+    render,
+    required_pairs,
+)
 
 WIDTH, HEIGHT = 1958, 1090
 
@@ -78,3 +89,43 @@ def thumbnails_gradient(settings: Settings, capacity: int):
         return jnp.mean(jax.lax.map(one, cameras))
 
     return jax.jit(jax.value_and_grad(loss))
+
+
+def prepare(program, splats: Splats, camera: Camera, counted: Camera) -> Prepared:
+    """Compiles `program(settings, capacity)` with room for what the camera `counted` needs."""
+    settings = Settings()
+    required = int(required_pairs(splats, counted, settings))
+    run = program(settings, next_capacity(required))
+    start = time.perf_counter()
+    run.lower(splats, camera).compile()
+    seconds = time.perf_counter() - start
+    return Prepared(
+        lambda: jax.block_until_ready(run(splats, camera)),
+        work=1.0,
+        compile_seconds=seconds,
+        extra={"pairs": required},
+    )
+
+
+def prepare_ball(program, count: int, width: int, height: int) -> Prepared:
+    """One picture of the ball."""
+    camera = ball_camera(width, height)
+    return prepare(program, ball_splats(count), camera, camera)
+
+
+def prepare_thumbnails(count: int) -> Prepared:
+    """Value and gradient over four 64 x 64 pictures."""
+    closest = orbit((0, 0, 0), 1.9, 0.0, 0.3, width=64, height=64)
+    return prepare(thumbnails_gradient, ball_splats(count), thumbnail_cameras(), closest)
+
+
+def cases(quick: bool) -> list[Case]:
+    """Forward and gradient of the large picture; gradient of four thumbnails."""
+    count, width, height = (5_000, 320, 180) if quick else (100_000, WIDTH, HEIGHT)
+    size = {"splats": count, "width": width, "height": height}
+    ball = partial(prepare_ball, count=count, width=width, height=height)
+    return [
+        Case("forward", "jaxphys", partial(ball, picture), size),
+        Case("value-and-gradient", "jaxphys", partial(ball, picture_gradient), size),
+        Case("thumbnails", "jaxphys", partial(prepare_thumbnails, 4_000), {"splats": 4_000}),
+    ]

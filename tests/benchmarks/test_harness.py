@@ -69,3 +69,19 @@ def test_worker_measures_and_prints_one_json_line(monkeypatch, capsys):
     assert line["particles"] == 2 and line["work"] == 4.0 and line["error"] == 0.25
     assert len(line["samples"]) == len(calls) - 1 >= worker.MINIMUM_CALLS
     assert line["versions"]["jax"]
+
+
+def test_a_whole_run_is_called_once(monkeypatch):
+    calls = []
+    case = Case("run", "jaxphys", lambda: Prepared(lambda: calls.append(1), 1.0, once=True))
+    monkeypatch.setattr(worker, "suite_cases", lambda suite, quick: [case])
+    line = worker.measure("headline", "run", "jaxphys", quick=False)
+    assert len(calls) == len(line["samples"]) == 1
+
+
+@pytest.mark.parametrize("suite", worker.SUITES)
+@pytest.mark.parametrize("quick", [True, False])
+def test_every_suite_lists_cases_of_its_own_names(suite, quick):
+    cases = worker.suite_cases(suite, quick)
+    assert cases and len({(c.name, c.method) for c in cases}) == len(cases)
+    assert any(case.method == "jaxphys" for case in cases)
