@@ -3,7 +3,7 @@
     python -m experiments.showcase jelly --out outputs/showcase
     python -m experiments.showcase all --sheets docs/figures
 
-Takes one to three minutes a material at the default size on two cores. Writes what `jaxphys
+Takes minutes a material on two cores. Writes what `jaxphys
 animate` writes, and with `--sheets` copies each contact sheet there.
 """
 

@@ -256,9 +256,10 @@ def polar_rotation(F: Array) -> Array:
     Closed form of Markley (1993, "Attitude determination using vector observations: a fast optimal
     matrix algorithm", eq. 14-16) from the sum of the signed singular values, the largest root of a
     quartic: Newton's method from above (eq. 20), which descends monotonically. One step of Newton
-        and Schulz removes what is left of the root's error. No
-    decomposition. The derivative solves Z S + S Z = R^T dF - dF^T R for a skew Z, that is it
-    divides by sums of singular values, and holds to every order.
+    and Schulz removes what is left of the root's error; in float32, digits are still lost where the
+    two smallest signed singular values nearly cancel. No decomposition. The derivative solves
+    Z S + S Z = R^T dF - dF^T R for a skew Z, that is it divides by sums of singular values, and
+    holds to every order.
     """
     C, det = algebra.cofactor(F), algebra.determinant(F)
     squared = jnp.sum(F * F, axis=(0, 1))

@@ -40,6 +40,16 @@ def with_parameters(module: Module, parameters: dict[str, Array]) -> Module:
     return nnx.merge(graph, structure.unflatten([parameters[_name(path)] for path, _ in leaves]))
 
 
+def require_priors() -> None:
+    """Raises `InputError` where the weights of a prior are not bundled, before any work is done."""
+    missing = {"point_prior", "pixel_prior"} - set(weights.manifest())
+    if missing:
+        raise InputError(
+            f"generate: this version comes without the weights {', '.join(sorted(missing))}; train "
+            "them (experiments/priors/README.md), or move an object you have with `jaxphys animate`"
+        )
+
+
 def _load(name: str, kind: type[Module], config_type: type) -> tuple[Module, dict[str, Any]]:
     arrays, entry = weights.load(name)
     known = {field.name for field in fields(config_type)}

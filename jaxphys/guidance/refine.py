@@ -3,8 +3,7 @@ better.
 
 The stage and the two parts of its instruction, context and task, are those of the paper: short
 prompts are elaborated, long ones reduced, backgrounds removed, the result is separated by commas.
-A
-language model does it if an OpenAI-compatible endpoint is configured; otherwise fixed rules do.
+A language model does it if an OpenAI-compatible endpoint is configured; otherwise fixed rules do.
 """
 
 import json

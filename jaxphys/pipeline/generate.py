@@ -66,9 +66,12 @@ def generate(
     Raises:
         InputError, SimulationError, KeyboardInterrupt: as `animate`; or an unusable prompt.
     """
+    from jaxphys.guidance.priors import require_priors
+
     timing = Timing()
     scene, generation = _asked(prompt, scene, steps, splats)
     validate(scene)
+    require_priors()
     refinement = refine(generation.prompt)
     out = run_directory(out)
     write_json(out / "prompt.json", dataclasses.asdict(refinement))

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import jaxphys.guidance.optimise as optimise
+import jaxphys.guidance.priors as priors
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.pipeline.generate import generate
@@ -33,6 +34,7 @@ def calls(monkeypatch):
         return from_points(points.astype(np.float32), np.full(3, 0.5), 0.3)
 
     monkeypatch.setattr(optimise, "text_to_gaussians", made)
+    monkeypatch.setattr(priors, "require_priors", lambda: None)
     monkeypatch.delenv("JAXPHYS_LLM_URL", raising=False)
     return asked
 
@@ -66,3 +68,10 @@ def test_unusable_prompts_leave_nothing(calls, tmp_path):
         with pytest.raises(InputError, match=r"^prompt: "):
             generate(prompt, SCENE, tmp_path / "out")
     assert not calls and not (tmp_path / "out").exists()
+
+
+def test_missing_weights_are_said_before_anything_is_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(priors.weights, "manifest", lambda: {"text_encoder": {}, "point_prior": {}})
+    with pytest.raises(InputError, match="without the weights pixel_prior"):
+        generate("a strawberry", Scene(), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
