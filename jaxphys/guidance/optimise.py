@@ -18,12 +18,11 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 from flax import nnx
-from scipy.spatial import cKDTree
 from tqdm import tqdm
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.density import DensityConfig, carry_moments, control_density, with_capacity
-from jaxphys.gaussians.gaussians import Gaussians, from_points, select, to_splats
+from jaxphys.gaussians.gaussians import Gaussians, from_points, select
 from jaxphys.gaussians.harmonics import dc_to_rgb
 from jaxphys.guidance import views
 from jaxphys.guidance.distillation import (
@@ -31,14 +30,14 @@ from jaxphys.guidance.distillation import (
     image_distillation,
     point_distillation,
 )
+from jaxphys.guidance.pictures import draw, neighbour_sizes, room_for_pairs
 from jaxphys.guidance.pixel_prior import PixelPrior
 from jaxphys.guidance.point_prior import PointPrior, SamplingConfig, sample_points
 from jaxphys.guidance.priors import load_pixel_prior, load_point_prior
 from jaxphys.guidance.text_encoder import load_text_encoder
-from jaxphys.render import Settings, look_at, next_capacity, render, required_pairs
+from jaxphys.render import next_capacity
 
 Array = jax.Array
-SETTINGS = Settings(tile_size=8)
 
 
 @dataclass(frozen=True)
@@ -108,15 +107,6 @@ class Guides(NamedTuple):
     text: Array
 
 
-def neighbour_sizes(points: np.ndarray, scale: float, largest: float) -> np.ndarray:
-    """(N,) standard deviations that close a surface sampled at `points` (N, 3): `scale` times the
-    mean distance to the three nearest neighbours, at most `largest`."""
-    near = min(4, len(points))
-    distance = cKDTree(points).query(points, k=near)[0].reshape(len(points), near)
-    mean = distance[:, 1:].mean(1) if near > 1 else np.full(len(points), largest)
-    return np.clip(scale * mean, 1e-3, largest).astype(np.float32)
-
-
 def initial_gaussians(guides: Guides, key: Array, config: OptimiseConfig) -> Gaussians:
     """Gaussians at the points of a cloud drawn from the point prior."""
     points, colours = sample_points(
@@ -153,36 +143,6 @@ def draw_views(key: Array, count: int, dtype=jnp.float32) -> tuple[Array, Array]
     azimuth = 2 * jnp.pi * (turn + jax.random.uniform(third, (), dtype))
     low, high = (math.sin(elevation) for elevation in views.ELEVATIONS)
     return azimuth, jnp.arcsin(jax.random.uniform(second, (count,), dtype, low, high))
-
-
-def draw(gaussians: Gaussians, azimuth: Array, elevation: Array, background, capacity: int | None):
-    """The picture (64, 64) of a view as the pixel prior was trained on it."""
-    eye = views.camera_position(azimuth, elevation, xp=jnp).astype(gaussians.means.dtype)
-    camera = look_at(
-        eye,
-        jnp.zeros_like(eye),
-        field_of_view=views.FIELD_OF_VIEW,
-        width=views.RESOLUTION,
-        height=views.RESOLUTION,
-    )
-    splats = to_splats(gaussians, eye)
-    return render(splats, camera, background=background, settings=SETTINGS, capacity=capacity)
-
-
-def _pairs(gaussians: Gaussians) -> int:
-    """Room for tile lists: twice what the neediest of a few views asks for."""
-    needs = []
-    for azimuth, elevation in ((0.0, 0.0), (1.6, 0.3), (0.8, 0.9)):
-        eye = jnp.asarray(views.camera_position(azimuth, elevation), gaussians.means.dtype)
-        camera = look_at(
-            eye,
-            jnp.zeros_like(eye),
-            field_of_view=views.FIELD_OF_VIEW,
-            width=views.RESOLUTION,
-            height=views.RESOLUTION,
-        )
-        needs.append(int(required_pairs(to_splats(gaussians, eye), camera, SETTINGS)))
-    return next_capacity(2 * max(needs))
 
 
 def regularity(gaussians: Gaussians, alive: Array, config: OptimiseConfig) -> Array:
@@ -269,7 +229,7 @@ def optimise(
     on_step: Callable[[OptimiseState], None] | None = None,
 ) -> OptimiseState:
     """Steps from `state` to the end; `on_step` sees every new state, to save or show it."""
-    capacity = _pairs(state.gaussians)
+    capacity = room_for_pairs(state.gaussians)
     bar = tqdm(
         total=config.steps,
         initial=int(state.step),

@@ -11,23 +11,19 @@ from PIL import Image
 from experiments.priors.models import MODELS, build
 from experiments.priors.models.surfaces import sample
 
-from .splat import bake_light, picture, visible_surface
+from .pictures import pictures
+from .prepare import SAMPLES, surface_points
 
-VIEWS = ((0.0, 0.3), (0.9, 0.3), (2.4, 0.7), (4.2, -0.15))  # azimuth, elevation [rad]
+AZIMUTHS, ELEVATIONS = (0.0, 0.9, 2.4, 4.2), (0.3, 0.3, 0.7, -0.15)  # [rad]
 
 
 def model_row(name: str, seeds: int) -> np.ndarray:
     """One row of pictures (64, 64 * seeds * views, 3) on a light ground."""
     row = []
     for seed in range(seeds):
-        mesh, _ = build(name, seed)
-        points, normals, colours = (
-            a.astype(np.float32) for a in sample(mesh, 60_000, np.random.default_rng(seed))
-        )
-        mask, normals = visible_surface(points, normals)
-        shaded = bake_light(colours, normals)[mask]
-        for azimuth, elevation in VIEWS:
-            image = picture(points[mask], shaded, azimuth, elevation) / 255
+        rng = np.random.default_rng(seed)
+        points, colours = surface_points(*sample(build(name, seed)[0], SAMPLES, rng), rng)
+        for image in pictures(points, colours, AZIMUTHS, ELEVATIONS) / 255:
             row.append(image[..., :3] * image[..., 3:] + 0.93 * (1 - image[..., 3:]))
     return np.concatenate(row, 1)
 

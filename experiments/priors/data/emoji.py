@@ -16,8 +16,8 @@ from PIL import Image
 from experiments.priors.models.palette import article
 from jaxphys.guidance.views import RESOLUTION
 
+from .pictures import straight
 from .prepare import Prepared, save
-from .splat import straight
 
 GROUPS = {3: "animals", 4: "food", 5: "travel", 6: "activities", 7: "objects"}
 NOT_OBJECTS = {"place-geographic", "sky-weather", "time", "arrow", "place-map"}

@@ -12,6 +12,7 @@ import argparse
 import re
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 from zipfile import ZipFile
@@ -212,7 +213,8 @@ def main() -> None:
     if options.attribution:
         options.attribution.write_text(attribution(entries))
         return
-    with ProcessPoolExecutor(options.workers) as pool:
+    # Spawned, not forked: each worker starts its own jax.
+    with ProcessPoolExecutor(options.workers, get_context("spawn")) as pool:
         reports = list(tqdm(pool.map(partial(draw, options.objects), entries), total=len(entries)))
     print(*[report for report in reports if report], sep="\n")
 

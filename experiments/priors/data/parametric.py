@@ -9,6 +9,7 @@ Objects that are already there are kept, so that a larger set extends a smaller 
 import argparse
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +41,8 @@ def main() -> None:
     options = parser.parse_args()
     items = [(name, seed) for seed in range(options.principal) for name in PRINCIPAL]
     items += [(n, s) for s in range(options.others) for n in MODELS if n not in PRINCIPAL]
-    with ProcessPoolExecutor(options.workers) as pool:
+    # Spawned, not forked: each worker starts its own jax.
+    with ProcessPoolExecutor(options.workers, get_context("spawn")) as pool:
         list(tqdm(pool.map(partial(draw, options.objects), items), total=len(items)))
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from jaxphys.core.files import atomic_path
 from jaxphys.guidance import views
 
-from .splat import bake_light, even_subset, picture, visible_surface
+from .pictures import pictures
+from .splat import bake_light, even_subset, visible_surface
 
-SAMPLES = 60_000  # dense surface samples that pictures are drawn from
-POINTS = 4096  # of them kept for the point prior
+SAMPLES = 60_000  # dense surface samples to find what can be seen
+POINTS = 4096  # of them kept, for the point prior and to draw pictures from
 VIEWS = 16
 
 
@@ -39,24 +40,23 @@ def random_views(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.n
     return azimuth, np.arcsin(rng.uniform(low, high, count))
 
 
-def prepare(points, normals, colours, seed: int) -> Prepared:
-    """From dense samples (N, 3) with normals and albedo in [0, 1], in the common frame."""
-    rng = np.random.default_rng(seed)
+def surface_points(points, normals, colours, rng) -> tuple[np.ndarray, np.ndarray]:
+    """The lit points (4096, 3) float16 and colours (4096, 3) uint8 of what can be seen of dense
+    samples (N, 3) with normals and albedo in [0, 1], in the common frame.
+    """
     points, normals, colours = (np.asarray(a, np.float32) for a in (points, normals, colours))
     mask, outward = visible_surface(points, normals)
     points, colours = points[mask], bake_light(colours, outward)[mask]
-    azimuth, elevation = random_views(rng, VIEWS)
-    images = np.stack(
-        [picture(points, colours, *view) for view in zip(azimuth, elevation, strict=True)]
-    )
     chosen = even_subset(points, POINTS, rng)
-    return Prepared(
-        points[chosen].astype(np.float16),
-        np.rint(255 * colours[chosen]).astype(np.uint8),
-        images,
-        azimuth.astype(np.float32),
-        elevation.astype(np.float32),
-    )
+    return points[chosen].astype(np.float16), np.rint(255 * colours[chosen]).astype(np.uint8)
+
+
+def prepare(points, normals, colours, seed: int) -> Prepared:
+    """Points and pictures of dense samples, see `surface_points`."""
+    rng = np.random.default_rng(seed)
+    azimuth, elevation = (a.astype(np.float32) for a in random_views(rng, VIEWS))
+    kept = surface_points(points, normals, colours, rng)
+    return Prepared(*kept, pictures(*kept, azimuth, elevation), azimuth, elevation)
 
 
 def stable_hash(text: str) -> int:

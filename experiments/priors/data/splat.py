@@ -1,13 +1,9 @@
-"""Dense coloured surface points: which can be seen, how they are lit, and their pictures by
-z-buffer.
-"""
+"""Dense coloured surface points: which can be seen, how they are lit, which to keep."""
 
 import numpy as np
 
 from experiments.priors.models.palette import golden_directions
 from jaxphys.guidance import views
-
-SUPERSAMPLING = 2
 
 
 def camera_frame(direction: np.ndarray) -> np.ndarray:
@@ -78,22 +74,6 @@ def bake_light(colours, normals):
     return np.clip(colours * (views.AMBIENT + views.DIFFUSE * normals[:, 2:]), 0, 1)
 
 
-def picture(points, colours, azimuth: float, elevation: float) -> np.ndarray:
-    """The points seen from a view: RGBA uint8 (64, 64, 4), straight alpha, antialiased."""
-    size = views.RESOLUTION * SUPERSAMPLING
-    position = views.camera_position(azimuth, elevation).astype(points.dtype)
-    index, _, depth = nearest_points(points, position, size)
-    alpha = (index >= 0).astype(np.float32)[:, None]
-    premultiplied = np.concatenate([colours[index] * alpha, alpha], 1).reshape(size, size, 4)
-    hole, nearer = pinholes(np.where(index >= 0, depth[index], np.inf).reshape(size, size))
-    around = (neighbours(premultiplied) * nearer[..., None]).sum(0)
-    premultiplied = np.where(
-        hole[..., None], around / np.maximum(nearer.sum(0), 1)[..., None], premultiplied
-    )
-    shape = (views.RESOLUTION, SUPERSAMPLING, views.RESOLUTION, SUPERSAMPLING, 4)
-    return straight(premultiplied.reshape(shape).mean((1, 3)))
-
-
 def neighbours(image: np.ndarray) -> np.ndarray:
     """The eight neighbours (8, H, W, ...) of every pixel; those past the border repeat the edge."""
     height, width = image.shape[:2]
@@ -110,14 +90,6 @@ def pinholes(depth: np.ndarray, step: float = 0.04) -> tuple[np.ndarray, np.ndar
     """
     nearer = neighbours(depth) < depth - step
     return nearer.sum(0) >= 5, nearer
-
-
-def straight(premultiplied: np.ndarray) -> np.ndarray:
-    """Premultiplied float RGBA in [0, 1] to straight uint8 RGBA; colour 0 where alpha is 0."""
-    alpha = premultiplied[..., 3:]
-    colour = premultiplied[..., :3] / np.maximum(alpha, 1e-6)
-    image = np.concatenate([np.where(alpha > 0, colour, 0), alpha], -1)
-    return np.rint(255 * np.clip(image, 0, 1)).astype(np.uint8)
 
 
 def even_subset(points, count: int, rng: np.random.Generator) -> np.ndarray:
