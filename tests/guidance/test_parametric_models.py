@@ -114,7 +114,7 @@ def test_pictures_show_the_side_they_are_taken_from():
     # Of length 1 at distance 2.5: the silhouette of a ball is sin = 0.5 / 2.5.
     half = np.tan(np.arcsin(0.5 / views.DISTANCE)) / np.tan(views.FIELD_OF_VIEW / 2) * 32
     width = (front[32, :, 3] > 127).sum()
-    assert abs(width - 2 * half) < 3
+    assert 0 <= width - 2 * half < 4  # a Gaussian reaches some two deviations beyond its centre
     assert (front[..., :3][front[..., 3] == 0] == 0).all()
 
 
