@@ -222,9 +222,13 @@ def stack(build: Callable[[nnx.Rngs], Stacked], count: int, rngs: nnx.Rngs) -> S
 
 
 def apply_stack(stacked: nnx.Module, step: Callable, carry: Any) -> Any:
-    """carry <- step(module, carry) for each module of a `stack` in turn, by `lax.scan`."""
+    """carry <- step(module, carry) for each module of a `stack` in turn, by `lax.scan`.
+
+    The gradient computes each module's inside again, which costs less here than keeping it.
+    """
     graph, state = nnx.split(stacked)
 
+    @partial(jax.checkpoint, prevent_cse=False)
     def body(carry: Any, parameters: Any) -> tuple[Any, None]:
         return step(nnx.merge(graph, parameters), carry), None
 
