@@ -30,6 +30,8 @@ def describe(line: dict) -> str:
     head = f"{line['suite']:9} {line['case']:28} {line['method']:12}"
     if "ratio" in line:
         return f"{head} {line['ratio']:.2f} x {line['peer']}"
+    if "cost" in line:
+        return f"{head} {line['cost']:.2f} of {line['baseline']}"
     if "seconds" not in line:
         return f"{head} {line['status']}"
     compiled = line["compile_seconds"]

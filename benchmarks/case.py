@@ -32,7 +32,7 @@ class Case:
     """One method on one problem; `prepare` runs in a fresh process.
 
     Cases of the same `name` are run in turn, so that a drift of the machine's speed hits all of
-    their methods alike.
+    their methods alike. The cost of method `jaxphys` is told in units of a `baseline` of its case.
     """
 
     name: str
@@ -41,3 +41,4 @@ class Case:
     size: Mapping[str, int] = field(default_factory=dict)
     dtype: str = "float32"
     rounds: int = 3
+    baseline: bool = False

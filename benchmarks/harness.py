@@ -61,24 +61,35 @@ def peer_ratios(lines: list[dict], ours: str = "jaxphys") -> Iterator[dict]:
     for method, peer in measured.items():
         if method == ours or method.startswith(f"{ours}-"):
             continue
-        rate = lambda line, samples: line["work"] / statistics.median(samples)  # noqa: E731
-        pairs = [
-            rate(mine, a) / rate(peer, b)
-            for a, b in zip(mine["samples"], peer["samples"], strict=False)
-        ]
-        yield {
-            "suite": mine["suite"],
-            "case": mine["case"],
-            "method": ours,
-            "peer": method,
-            "ratio": statistics.median(pairs),
-            "ratio_low": min(pairs),
-            "ratio_high": max(pairs),
-        }
+        yield _compared(mine, {"peer": method}, "ratio", rate_ratios(mine, peer))
+
+
+def baseline_costs(lines: list[dict], baselines: set[str], ours: str = "jaxphys") -> Iterator[dict]:
+    """Time per work of ours over that of each baseline method of the same case, round by round."""
+    measured = {line["method"]: line for line in lines if "work" in line}
+    if ours not in measured:
+        return
+    for method in sorted(baselines & measured.keys()):
+        pairs = rate_ratios(measured[method], measured[ours])
+        yield _compared(measured[ours], {"baseline": method}, "cost", pairs)
+
+
+def rate_ratios(line: dict, other: dict) -> list[float]:
+    """Work per second of one line over that of the other, one number a round."""
+    return [
+        line["work"] / statistics.median(a) / (other["work"] / statistics.median(b))
+        for a, b in zip(line["samples"], other["samples"], strict=False)
+    ]
+
+
+def _compared(line: dict, other: dict, name: str, pairs: list[float]) -> dict:
+    identity = {key: line[key] for key in ("suite", "case", "method")}
+    spread = {f"{name}_low": min(pairs), f"{name}_high": max(pairs)}
+    return {**identity, **other, name: statistics.median(pairs), **spread}
 
 
 def run_suite(suite: str, quick: bool) -> Iterator[dict]:
-    """Lines of one suite: one per case and method, then one per peer."""
+    """Lines of one suite: one per case and method, then one per peer and baseline."""
     for _, group in groupby(suite_cases(suite, quick), key=lambda case: case.name):
         cases = list(group)
         rounds: dict[str, list[dict]] = {case.method: [] for case in cases}
@@ -95,3 +106,4 @@ def run_suite(suite: str, quick: bool) -> Iterator[dict]:
         lines = [merge_rounds(i, rounds[i["method"]]) for i in identity]
         yield from lines
         yield from peer_ratios(lines)
+        yield from baseline_costs(lines, {case.method for case in cases if case.baseline})

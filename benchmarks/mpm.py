@@ -144,14 +144,19 @@ def prepare_peer(law: str, cells: int, nodes: int, steps: int) -> Prepared:
 
 
 def cases(quick: bool) -> list[Case]:
-    """Each law on each size, beside the peer where it knows the law."""
+    """Each law on each size, beside the peer where it knows the law, and beside neo-Hookean where
+    the law is plastic.
+    """
     found = []
-    for size, (cells, nodes, steps) in (QUICK_SIZES if quick else SIZES).items():
+    for size, numbers in (QUICK_SIZES if quick else SIZES).items():
+        cells, nodes, _ = numbers
         for law in LAWS:
             name = f"{law.lower().replace(' ', '-')}-{size}"
-            arguments = (law, cells, nodes, steps)
-            numbers = {"particles": 8 * cells**3, "nodes": nodes**3}
-            found.append(Case(name, "jaxphys", partial(prepare, *arguments), numbers))
+            counts = {"particles": 8 * cells**3, "nodes": nodes**3}
+            found.append(Case(name, "jaxphys", partial(prepare, law, *numbers), counts))
             if law in PEER_LAWS:
-                found.append(Case(name, "taichi", partial(prepare_peer, *arguments), numbers))
+                found.append(Case(name, "taichi", partial(prepare_peer, law, *numbers), counts))
+            else:
+                run = partial(prepare, "neo-Hookean", *numbers)
+                found.append(Case(name, "jaxphys-neo-Hookean", run, counts, baseline=True))
     return found

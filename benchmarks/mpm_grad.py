@@ -1,18 +1,23 @@
-"""Suite 'mpm-grad': value and gradient of a rollout, beside the forward rollout of the same steps.
+"""Suite 'mpm-grad': value and gradient of a rollout, its cost in forward rollouts, and the peer.
 
-The gradient is that of the mean square position by every particle's Young's modulus, through
-checkpointed segments. Work is counted in particle-steps, so the ratio of the two lines' seconds is
-the cost of a gradient in forward passes.
+The gradient is that of the mean square position by every particle's Young's modulus, ours through
+checkpointed segments. Work is counted in particle-steps. The peer in
+`benchmarks/peers/taichi_mpm_grad.py` keeps every step, and is left out where that takes more memory
+than `PEER_BYTES`.
 """
 
 from functools import partial
 
 from benchmarks.case import Case, Prepared
 from benchmarks.mpm import block_case, compiled, forward, value_and_gradient
+from benchmarks.peers.taichi_mpm_grad import build, field_bytes
 
 # case: (cells a side of the block, nodes a side of the grid, steps)
 SIZES = {"50k-100": (18, 64, 100), "50k-2000": (18, 64, 2000)}
 QUICK_SIZES = {"8k-16": (10, 32, 16)}
+PEER_BYTES = 8 * 2**30
+# From so many steps on, one call is timed and no other.
+LONG = 1000
 
 
 def prepare(program, cells: int, nodes: int, steps: int) -> Prepared:
@@ -24,20 +29,37 @@ def prepare(program, cells: int, nodes: int, steps: int) -> Prepared:
         lambda: jax.block_until_ready(run()),
         work=8 * cells**3 * steps,
         compile_seconds=compiled(run),
+        once=steps >= LONG,
         extra={"steps": steps},
     )
 
 
+def prepare_peer(cells: int, nodes: int, steps: int) -> Prepared:
+    """Taichi's CPU backend on two threads, forth and back."""
+    run, _ = build(block_case(cells, nodes), steps)
+    return Prepared(run, work=8 * cells**3 * steps, extra={"steps": steps})
+
+
 def cases(quick: bool) -> list[Case]:
-    """Forward and gradient on each size."""
-    return [
-        Case(
-            f"{name}-{size}",
-            "jaxphys",
-            partial(prepare, program, *numbers),
-            {"particles": 8 * numbers[0] ** 3},
-            rounds=3 if numbers[2] < 1000 else 1,
-        )
-        for size, numbers in (QUICK_SIZES if quick else SIZES).items()
-        for name, program in (("forward", forward), ("gradient", value_and_gradient))
-    ]
+    """The gradient, the forward rollout and, where it fits, the peer's gradient on each size."""
+    found = []
+    for size, numbers in (QUICK_SIZES if quick else SIZES).items():
+        cells, nodes, steps = numbers
+        methods = {
+            "jaxphys": partial(prepare, value_and_gradient, *numbers),
+            "jaxphys-forward": partial(prepare, forward, *numbers),
+        }
+        if field_bytes(8 * cells**3, nodes, steps) <= PEER_BYTES:
+            methods["taichi"] = partial(prepare_peer, *numbers)
+        found += [
+            Case(
+                size,
+                method,
+                run,
+                {"particles": 8 * cells**3, "nodes": nodes**3},
+                rounds=1 if steps >= LONG else 3,
+                baseline=method == "jaxphys-forward",
+            )
+            for method, run in methods.items()
+        ]
+    return found

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks import worker
 from benchmarks.case import Case, Prepared
-from benchmarks.harness import merge_rounds, peer_ratios
+from benchmarks.harness import baseline_costs, merge_rounds, peer_ratios
 
 IDENTITY = {"suite": "s", "case": "c", "method": "jaxphys"}
 
@@ -85,3 +85,37 @@ def test_every_suite_lists_cases_of_its_own_names(suite, quick):
     cases = worker.suite_cases(suite, quick)
     assert cases and len({(c.name, c.method) for c in cases}) == len(cases)
     assert any(case.method == "jaxphys" for case in cases)
+
+
+def test_cost_is_time_per_work_over_the_baseline():
+    ours = merge_rounds(IDENTITY, [round_of(3.0), round_of(8.0)])
+    base = merge_rounds(IDENTITY | {"method": "jaxphys-forward"}, [round_of(1.0), round_of(2.0)])
+    (line,) = baseline_costs([ours, base], {"jaxphys-forward"})
+    assert line["baseline"] == "jaxphys-forward" and line["cost"] == pytest.approx(3.5)
+    assert (line["cost_low"], line["cost_high"]) == pytest.approx((3.0, 4.0))
+    assert list(baseline_costs([ours, base], set())) == []
+    assert list(baseline_costs([base], {"jaxphys-forward"})) == []
+
+
+def test_gradients_and_plastic_laws_have_their_baseline_in_the_same_case():
+    def pairs(suite):
+        cases = worker.suite_cases(suite, quick=False)
+        return {(c.name, c.method) for c in cases if c.baseline}
+
+    assert pairs("mpm-grad") == {(size, "jaxphys-forward") for size in ("50k-100", "50k-2000")}
+    assert pairs("mpm") == {
+        (f"{law}-{size}", "jaxphys-neo-Hookean")
+        for law in ("metal", "sand")
+        for size in ("64k", "262k")
+    }
+
+
+def test_peers_run_in_the_cases_that_they_can():
+    def peers(suite):
+        cases = worker.suite_cases(suite, quick=False)
+        return {c.name for c in cases if c.method == "taichi"}
+
+    laws = ("neo-hookean", "fixed-corotated")
+    assert peers("mpm") == {f"{law}-{size}" for law in laws for size in ("64k", "262k")}
+    # Every step of 50k-2000 would take 47 GB.
+    assert peers("mpm-grad") == {"50k-100"}
