@@ -106,7 +106,7 @@ def _fracture(spacing: float) -> Scene:
     for axis, offset in enumerate((0.06, -0.05, 0.04)):
         place, half_size = list(centre), [size] * 3
         place[axis] += offset * size
-        half_size[axis] = 1.0 * spacing
+        half_size[axis] = 0.5 * spacing
         flaws.append(
             Region(
                 tuple(place), tuple(half_size), {"fracture_strain": 5e-3, "softening_strain": 0.02}
