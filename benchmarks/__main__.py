@@ -27,7 +27,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def describe(line: dict) -> str:
     """A line for a person, on standard error."""
-    head = f"{line['suite']:9} {line['case']:28} {line['method']:12}"
+    head = f"{line['suite']:9} {line['case']:28} {line['method']:19}"
     if "ratio" in line:
         return f"{head} {line['ratio']:.2f} x {line['peer']}"
     if "cost" in line:

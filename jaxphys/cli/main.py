@@ -35,6 +35,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         print(f"jaxphys: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
+    except OSError as error:
+        # A full disk or a folder that must not be written to is for the user to mend too.
+        where = f"{error.filename}: " if error.filename else ""
+        print(f"jaxphys: {where}{error.strerror or error}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("jaxphys: interrupted; the same command resumes", file=sys.stderr)
         return INTERRUPTED

@@ -11,6 +11,8 @@ from jaxphys.core.errors import InputError
 # glTF prescribes y up, and most .obj exporters write it; CAD and scanning formats have z up.
 _UP = {".glb": "y", ".gltf": "y", ".obj": "y"}
 _OPAQUE = -1.0
+# Readers hold a file several times over.
+_FILE_BYTES = 2**30
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,10 @@ def _material(material, linear: bool) -> tuple[np.ndarray, object, float]:
 
 
 def _require_companions(path: Path) -> None:
-    """An .obj names its .mtl, and that its images: a missing one would silently leave it grey."""
+    """An .obj names its .mtl, and that its images: a missing or broken one would silently leave it
+    grey.
+    """
+    from PIL import Image
 
     def named(file: Path, keyword: str) -> list[Path]:
         lines = file.read_text(errors="replace").splitlines()
@@ -103,9 +108,17 @@ def _require_companions(path: Path) -> None:
         if not library.is_file():
             raise InputError(f"{path}: its materials {library} are missing; put the file there")
         for image in named(library, "map_Kd"):
-            options = image.name.split()  # "map_Kd -s 1 1 1 name.png"
-            if not image.is_file() and not (image.parent / options[-1]).is_file():
+            if not image.is_file():
+                image = image.parent / image.name.split()[-1]  # "map_Kd -s 1 1 1 name.png"
+            if not image.is_file():
                 raise InputError(f"{library}: its texture {image} is missing; put the file there")
+            try:
+                with Image.open(image) as opened:
+                    opened.load()
+            except Exception as error:  # decoders of a dozen formats raise whatever they meet
+                raise InputError(
+                    f"{library}: its texture {image} cannot be read ({error}); export it again"
+                ) from error
 
 
 def load_mesh(path: str | os.PathLike, *, up: str | None = None) -> Mesh:
@@ -127,6 +140,11 @@ def load_mesh(path: str | os.PathLike, *, up: str | None = None) -> Mesh:
         raise InputError(f"up={up!r}: give 'y' or 'z'")
     if not path.is_file():
         raise InputError(f"{path}: no such file; check the path")
+    if path.stat().st_size > _FILE_BYTES:
+        raise InputError(
+            f"{path}: {path.stat().st_size / 2**30:.1f} GiB, more than the limit of "
+            f"{_FILE_BYTES // 2**30}; simplify the mesh"
+        )
     trimesh = _import_trimesh()
     suffix = path.suffix.lower()
     if suffix == ".obj":
@@ -148,8 +166,15 @@ def load_mesh(path: str | os.PathLike, *, up: str | None = None) -> Mesh:
         faces = getattr(part, "faces", None)
         if faces is None or len(faces) == 0:
             continue
+        outside = (np.asarray(faces) < 0) | (np.asarray(faces) >= len(part.vertices))
+        if outside.any():
+            raise InputError(
+                f"{path}: {outside.any(axis=1).sum()} of {len(faces)} triangles name corners that "
+                f"the file does not hold (it has {len(part.vertices)}); export it again"
+            )
         corners = np.asarray(part.vertices, np.float64)[faces]
-        corners = corners @ matrix[:3, :3].T + matrix[:3, 3]
+        with np.errstate(invalid="ignore", over="ignore"):  # told below, for all parts together
+            corners = corners @ matrix[:3, :3].T + matrix[:3, 3]
         colours, uvs = np.ones((*corners.shape[:2], 4)), np.zeros((*corners.shape[:2], 2))
         index, cutoff = -1, _OPAQUE
         if part.visual.kind == "texture":

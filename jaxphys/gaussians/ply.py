@@ -43,6 +43,9 @@ _TYPES = {
 _ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
 _REST_COUNTS = {0: 0, 9: 1, 24: 2, 45: 3}
 _HEADER_LINES = 4096
+# A text line this long holds no row of numbers; a table this large is no scene that could be drawn.
+_LINE_BYTES = 2**16
+_TABLE_BYTES = 4 * 2**30
 _POSITION = ["x", "y", "z"]
 _NORMAL = ["nx", "ny", "nz"]
 _DC = [f"f_dc_{i}" for i in range(3)]
@@ -116,7 +119,7 @@ def _read_header(file: BinaryIO, path) -> tuple[str, list[_Element]]:
                 pass
             case ["format", name, "1.0"] if name in _ORDERS:
                 style = name
-            case ["element", name, count] if count.isdecimal():
+            case ["element", name, count] if count.isdecimal() and len(count) < 20:
                 elements.append(_Element(name, int(count)))
             case ["property", "list", *_] if elements:
                 elements[-1].has_list = True
@@ -149,17 +152,14 @@ def _read_table(file: BinaryIO, path, style: str, elements: list[_Element], limi
     truncated = InputError(
         f"{path}: cut off: the header promises {element.count} Gaussians; copy the file again"
     )
+    if element.count * dtype.itemsize > _TABLE_BYTES:
+        raise InputError(
+            f"{path}: {element.count * dtype.itemsize / 2**30:.1f} GiB of Gaussians, more than the "
+            f"limit of {_TABLE_BYTES // 2**30}; thin it out"
+        )
     if style == "ascii":
-        lines = file.read().splitlines()[sum(other.count for other in before) :]
-        if len(lines) < element.count:
-            raise truncated
-        rows = [line.split() for line in lines[: element.count]]
-        if any(len(row) != len(dtype.names) for row in rows):
-            raise InputError(f"{path}: a line does not hold {len(dtype.names)} numbers")
-        try:
-            values = np.array(rows, dtype=np.float64).reshape(element.count, len(dtype.names))
-        except ValueError as error:
-            raise InputError(f"{path}: a line holds something that is no number") from error
+        skipped = sum(other.count for other in before)
+        values = _read_lines(file, path, skipped, element.count, len(dtype.names), truncated)
         return {name: values[:, i] for i, name in enumerate(dtype.names)}
     skipped = sum(other.count * other.dtype("<").itemsize for other in before)
     wanted = element.count * dtype.itemsize
@@ -175,6 +175,34 @@ def _read_table(file: BinaryIO, path, style: str, elements: list[_Element], limi
     file.seek(start)
     table = np.frombuffer(file.read(wanted), dtype)
     return {name: table[name] for name in dtype.names}
+
+
+def _read_lines(file: BinaryIO, path, skipped: int, count: int, width: int, truncated: InputError):
+    """`count` text lines of `width` numbers, after `skipped` others, as float64 (count, width)."""
+    # A number takes two bytes at least, with what parts it from the next.
+    if 2 * count * width > os.fstat(file.fileno()).st_size - file.tell() + 1:
+        raise truncated
+
+    def next_line() -> bytes:
+        line = file.readline(_LINE_BYTES)
+        if not line:
+            raise truncated
+        if len(line) == _LINE_BYTES:
+            raise InputError(f"{path}: a line of more than {_LINE_BYTES} bytes; export it again")
+        return line
+
+    for _ in range(skipped):
+        next_line()
+    values = np.empty((count, width))
+    for row in values:
+        words = next_line().split()
+        if len(words) != width:
+            raise InputError(f"{path}: a line does not hold {width} numbers")
+        try:
+            row[:] = np.array(words, dtype=np.float64)
+        except ValueError as error:
+            raise InputError(f"{path}: a line holds something that is no number") from error
+    return values
 
 
 def _require(path, table: dict[str, np.ndarray]) -> int:
