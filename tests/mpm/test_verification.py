@@ -52,6 +52,18 @@ def fit(build, levels, sizes, **options):
     return errors, observed_order(sizes, errors)
 
 
+def spoiled(problem, modulus=1.0, volume=1.0, gravity=1.0):
+    """The problem with wrong physics: these factors on what the solver is given, not on the
+    truth.
+    """
+    model = problem.model
+    moduli = model.parameters | {"youngs_modulus": modulus * model.parameters["youngs_modulus"]}
+    wrong = replace(
+        model, parameters=moduli, volume=volume * model.volume, gravity=gravity * model.gravity
+    )
+    return replace(problem, model=wrong)
+
+
 # The truths themselves.
 
 
@@ -134,11 +146,7 @@ def test_free_bar_is_second_order():
 
 def test_free_bar_order_sees_a_modulus_wrong_by_two_per_cent():
     def build(cells):
-        problem = free_bar(Bar(), cells, room=LINE)
-        moduli = problem.model.parameters | {
-            "youngs_modulus": 1.02 * problem.model.parameters["youngs_modulus"]
-        }
-        return replace(problem, model=replace(problem.model, parameters=moduli))
+        return spoiled(free_bar(Bar(), cells, room=LINE), modulus=1.02)
 
     _, order = fit(build, BARS, [1 / n for n in BARS])
     assert abs(order - 2) > 0.3, order
@@ -174,11 +182,31 @@ def test_held_end_is_first_order():
     assert abs(order - 1) < 0.1, (errors, order)
 
 
+@pytest.mark.parametrize("wrong", [{"modulus": 1.2}, {"modulus": 0.8}, {"volume": 0.5}])
+def test_held_end_order_sees_a_wrong_stress(wrong):
+    errors, order = fit(
+        lambda n: spoiled(held_bar(Bar(), n, room=LINE), **wrong), (16, 32, 64), (4.0, 2.0, 1.0)
+    )
+    assert abs(order - 1) > 0.3 and errors[-1] > 0.1, (errors, order)
+
+
 def test_column_under_sudden_gravity_is_first_order():
     errors, order = fit(
         lambda n: sudden_column(Column(), n, room=LINE), (16, 32, 64), (4.0, 2.0, 1.0)
     )
     assert abs(order - 1) < 0.1, (errors, order)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"gravity": -1.0}, {"gravity": 0.5}, {"modulus": 0.5}, {"volume": 0.5}]
+)
+def test_column_order_sees_wrong_gravity_and_stress(wrong):
+    errors, order = fit(
+        lambda n: spoiled(sudden_column(Column(), n, room=LINE), **wrong),
+        (16, 32, 64),
+        (4.0, 2.0, 1.0),
+    )
+    assert abs(order - 1) > 0.3 and errors[-1] > 0.1, (errors, order)
 
 
 def test_column_rises_to_twice_its_weight_and_shortening():
@@ -297,6 +325,18 @@ def test_rigid_rotation_is_second_order():
     assert abs(order - 2) < 0.15, (errors, order)
 
 
+@pytest.mark.parametrize(("share", "keep_affine"), [(1.0, 0.0), (0.0, 1.0), (-1.0, 1.0)])
+def test_rotation_order_sees_lost_affine_velocities_and_a_wrong_force(share, keep_affine):
+    plates = (4, 8, 16)
+    errors, order = fit(
+        lambda n: plate(SPIN, n, np.pi / 2, share=share, room=PLANE),
+        plates,
+        [1 / n for n in plates],
+        keep_affine=keep_affine,
+    )
+    assert not abs(order - 2) < 0.15 and errors[-1] > 0.05, (errors, order)
+
+
 def test_free_rotation_keeps_angular_momentum():
     problem = plate(SPIN, 8, 2 * np.pi, share=0.0, room=PLANE)
     before = angular_momentum(problem, problem.state)[2]
@@ -333,3 +373,23 @@ def test_cube_is_second_order():
     cells, room = (6, 9, 12, 18), cube_room(18)
     errors, order = fit(lambda n: free_cube(Cube(), n, room=room), cells, [1 / n for n in cells])
     assert abs(order - 2) < 0.1, (errors, order)
+
+
+def test_small_cubes_see_a_wrong_stress_and_lost_affine_velocities():
+    """Control of the cube, on its two coarsest levels: what is right falls, what is wrong stays."""
+    cells, room = (6, 9), cube_room(9)
+    sizes = [1 / n for n in cells]
+
+    def measured(keep_affine=1.0, **wrong):
+        return fit(
+            lambda n: spoiled(free_cube(Cube(), n, room=room), **wrong),
+            cells,
+            sizes,
+            keep_affine=keep_affine,
+        )
+
+    right, order = measured()
+    assert abs(order - 2) < 0.3, (right, order)
+    for options in ({"volume": 0.5}, {"modulus": 1.2}, {"keep_affine": 0.0}):
+        errors, order = measured(**options)
+        assert not abs(order - 2) < 0.3 and errors[-1] > 2 * right[-1], (options, errors, order)
