@@ -1,7 +1,8 @@
 """The 2D prior: a diffusion transformer over patches of a small picture, told text and view.
 
 A plain ViT with adaLN-zero conditioning (DiT, Peebles & Xie 2023) that predicts the clean picture,
-which lets patches be as large as a token is wide (Li & He 2025, "Back to basics").
+which lets patches be as large as a token is wide (Li & He 2025, "Back to basics"). Tokens read and
+write windows that overlap by half, so that no seams show between patches.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from jaxphys.guidance.layers import (
 from jaxphys.guidance.views import FEATURES
 
 Array = jax.Array
+QUARTERS = ((0, 0), (0, 1), (1, 0), (1, 1))
 
 
 @dataclass(frozen=True)
@@ -61,9 +63,9 @@ class PixelPrior(nnx.Module):
     def __init__(self, config: PixelPriorConfig, *, rngs: nnx.Rngs):
         self.config = config
         self.schedule = Schedule(config.shift)
-        width, patch = config.width, 3 * config.patch**2
+        width, window = config.width, 4 * 3 * config.patch**2
         tokens = (config.resolution // config.patch) ** 2
-        self.embed = Linear(patch, width, rngs=rngs)
+        self.embed = Linear(window, width, rngs=rngs)
         self.position = nnx.Param(0.02 * jax.random.normal(rngs.params(), (tokens, width)))
         self.time = Perceptron(128, width, width, rngs=rngs)
         self.text = Linear(config.text, width, rngs=rngs)
@@ -84,25 +86,31 @@ class PixelPrior(nnx.Module):
 
         self.layers = stack(layer, config.layers, rngs)
         self.modulation = Modulation(width, width, config.rank, 2, rngs=rngs)
-        self.output = Linear(width, patch, rngs=rngs, zero=True)
+        self.output = Linear(width, window, rngs=rngs, zero=True)
 
-    def _patches(self, pictures: Array) -> Array:
-        batch, side, p = (
-            pictures.shape[0],
-            self.config.resolution // self.config.patch,
-            self.config.patch,
-        )
-        cut = pictures.reshape(batch, side, p, side, p, 3).transpose(0, 1, 3, 2, 4, 5)
-        return cut.reshape(batch, side * side, p * p * 3)
+    def _windows(self, pictures: Array) -> Array:
+        """(B, R, R, 3) -> (B, tokens, 4 p p 3): around each patch a window twice as wide, as four
+        quarters. What lies beyond the picture is zero."""
+        p, size = self.config.patch, self.config.resolution
+        side, half = size // p, p // 2
+        padded = jnp.pad(pictures, ((0, 0), (half, half), (half, half), (0, 0)))
+        quarters = []
+        for row, column in QUARTERS:
+            cut = padded[:, row * p : row * p + size, column * p : column * p + size]
+            cut = cut.reshape(-1, side, p, side, p, 3).transpose(0, 1, 3, 2, 4, 5)
+            quarters.append(cut.reshape(-1, side * side, p * p * 3))
+        return jnp.concatenate(quarters, -1)
 
-    def _pictures(self, patches: Array) -> Array:
-        batch, side, p = (
-            patches.shape[0],
-            self.config.resolution // self.config.patch,
-            self.config.patch,
-        )
-        cut = patches.reshape(batch, side, side, p, p, 3).transpose(0, 1, 3, 2, 4, 5)
-        return cut.reshape(batch, side * p, side * p, 3)
+    def _pictures(self, windows: Array) -> Array:
+        """(B, tokens, 4 p p 3) -> (B, R, R, 3): the sum of overlapping windows."""
+        p, size = self.config.patch, self.config.resolution
+        side, half = size // p, p // 2
+        padded = 0.0
+        for (row, column), cut in zip(QUARTERS, jnp.split(windows, 4, -1), strict=True):
+            cut = cut.reshape(-1, side, side, p, p, 3).transpose(0, 1, 3, 2, 4, 5)
+            margins = ((row * p, p - row * p), (column * p, p - column * p))
+            padded += jnp.pad(cut.reshape(-1, size, size, 3), ((0, 0), *margins, (0, 0)))
+        return padded[:, half : half + size, half : half + size]
 
     def __call__(self, noisy: Array, time: Array, condition: PixelCondition) -> Array:
         """Predicts what `config.kind` says of `noisy` (B, R, R, 3) at `time` (B,) in [0, 1]."""
@@ -113,7 +121,7 @@ class PixelPrior(nnx.Module):
         told = told + self.mix(normalise(told))
         told = normalise(told)
         position = self.position[...].astype(dtype).reshape(1, -1)
-        x = self.embed(self._patches(noisy.astype(dtype)))
+        x = self.embed(self._windows(noisy.astype(dtype)))
         x = x + spread(position, x.shape[0]).reshape(x.shape)
         x = apply_stack(self.layers, lambda layer, x: layer(x, told), x)
         shift, scale = self.modulation(told)

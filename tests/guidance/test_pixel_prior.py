@@ -41,13 +41,22 @@ def test_starts_from_zero_and_keeps_shape_and_dtype():
     np.testing.assert_array_equal(found, 0.0)
 
 
-def test_patches_are_cut_and_joined_exactly():
+def test_windows_are_cut_around_their_patches_and_summed():
     prior = PixelPrior(TINY, rngs=nnx.Rngs(0))
     noisy, _, _ = inputs()
-    patches = prior._patches(noisy)
-    assert patches.shape == (2, 16, 48)
-    np.testing.assert_array_equal(patches[0, 1].reshape(4, 4, 3), noisy[0, :4, 4:8])
-    np.testing.assert_array_equal(prior._pictures(patches), noisy)
+    windows = prior._windows(noisy)
+    assert windows.shape == (2, 16, 192)
+    # The second patch of the first row, rows 0-3 and columns 4-7: its window reaches 2 beyond.
+    window = np.zeros((8, 8, 3), np.float32)
+    window[2:] = noisy[0, :6, 2:10]
+    quarters = windows[0, 1].reshape(2, 2, 4, 4, 3).transpose(0, 2, 1, 3, 4).reshape(8, 8, 3)
+    np.testing.assert_array_equal(quarters, window)
+    # Each pixel lies in four windows, those along the edge in two, in the corners in one.
+    times = np.full(16, 2.0)
+    times[[0, 1, 14, 15]] = 1.0
+    np.testing.assert_allclose(
+        prior._pictures(windows), noisy * np.outer(times, times)[None, :, :, None], rtol=1e-6
+    )
 
 
 @pytest.mark.parametrize("part", ["noisy", "time", "text", "view"])
