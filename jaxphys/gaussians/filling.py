@@ -9,7 +9,7 @@ cannot stall the search; a Gaussian flatter than a cell counts with half a cell 
 that thin shells do not slip between grid nodes; and both searches run over the whole grid at once.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -28,7 +28,8 @@ class FillingConfig:
 
     Attributes:
         spacing: side of a cell [m].
-        density_threshold: summed opacity above which a cell is solid and topped up.
+        density_threshold: summed opacity above which a cell is solid and topped up; None: a quarter
+            of the median over the cells that hold Gaussians, which suits sparse and dense shells.
         search_threshold: density that a ray must meet to have hit something; None: as above.
         search_count: how many of the directions searched must hit; at most all of them.
         exclude_direction: the one that is not searched, for objects open on that side.
@@ -42,7 +43,7 @@ class FillingConfig:
     """
 
     spacing: float
-    density_threshold: float = 5.0
+    density_threshold: float | None = None
     search_threshold: float | None = None
     search_count: int = 6
     exclude_direction: int = -1
@@ -176,9 +177,12 @@ def fill_interior(gaussians: Gaussians, config: FillingConfig, seed: int = 0) ->
     density = density_field(gaussians, origin, shape, config)
     if config.smooth:
         density = gaussian_filter(density, 1.0)
-    wanted = (density > config.density_threshold) | inner_cells(density, config)
     present = _cells(means, origin, config.spacing)
     present = present[np.all((present >= 0) & (present < shape), axis=1)]
+    if config.density_threshold is None:
+        own = density[tuple(present.T)]
+        config = replace(config, density_threshold=0.25 * float(np.median(own)))
+    wanted = (density > config.density_threshold) | inner_cells(density, config)
     count = np.zeros(shape, np.int64)
     np.add.at(count, tuple(present.T), 1)
     missing = np.where(wanted, np.maximum(config.per_cell - count, 0), 0)

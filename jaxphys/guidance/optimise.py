@@ -66,7 +66,7 @@ class OptimiseConfig:
     views: int = 4
     sampling: SamplingConfig = SamplingConfig()
     image: DistillationConfig = DistillationConfig(
-        guidance=4.0, rescale=0.7, weight="clean", time=(0.05, 0.6, 0.3)
+        guidance=10.0, rescale=0.7, weight="clean", time=(0.05, 0.6, 0.3)
     )
     point: DistillationConfig = DistillationConfig(
         guidance=3.0, rescale=0.7, weight="clean", time=(0.02, 0.4, 0.1)
@@ -75,11 +75,11 @@ class OptimiseConfig:
     point_weight: float = 0.5
     regular_weight: float = 1.0
     rates: tuple[tuple[str, float], ...] = (
-        ("means", 1e-3),
-        ("log_scales", 4e-3),
-        ("quaternions", 4e-3),
-        ("opacity_logits", 1e-2),
-        ("harmonics", 1e-2),
+        ("means", 2e-3),
+        ("log_scales", 6e-3),
+        ("quaternions", 6e-3),
+        ("opacity_logits", 2e-2),
+        ("harmonics", 1.5e-2),
     )
     size: float = 0.6
     opacity: float = 0.85

@@ -52,7 +52,8 @@ class Filling(_Checked):
 
     Attributes:
         spacing: of the cells that are searched [m]; null: half the grid's spacing.
-        density_threshold: summed opacity above which a cell counts as solid.
+        density_threshold: summed opacity above which a cell counts as solid; null: a quarter of
+            the median over the cells that hold Gaussians.
         search_threshold: density that a ray must meet to have hit something; null: as above.
         search_count: how many of the six directions must hit for a cell to be inside.
         exclude_direction, ray_direction: 0 to 5 for +x, -x, +y, -y, +z, -z; -1 for none. The first
@@ -67,7 +68,7 @@ class Filling(_Checked):
     """
 
     spacing: float | None = field(default=None, metadata=POSITIVE)
-    density_threshold: float = field(default=1.0, metadata=NON_NEGATIVE)
+    density_threshold: float | None = field(default=None, metadata=NON_NEGATIVE)
     search_threshold: float | None = field(default=None, metadata=NON_NEGATIVE)
     search_count: int = field(default=6, metadata=between(0, 6))
     exclude_direction: int = field(default=-1, metadata=between(-1, 5))

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.filling import FillingConfig, fill_interior, inner_cells, particle_volumes
-from jaxphys.gaussians.gaussians import Gaussians
+from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.gaussians.relax import blue_noise
 from jaxphys.gaussians.surface import facing
 
@@ -171,3 +171,23 @@ def test_nothing_to_relax():
         blue_noise(np.zeros((3, 3)), 0.0)
     with pytest.raises(InputError, match="not finite"):
         blue_noise(np.full((3, 3), np.nan), 0.1)
+
+
+@pytest.mark.parametrize("count", [900, 6000])
+def test_sparse_and_dense_shells_are_filled_by_the_same_default(count):
+    turn = np.arange(count) * np.pi * (3 - 5**0.5)
+    z = 1 - (2 * np.arange(count) + 1) / count
+    level = np.sqrt(1 - z**2)
+    ball = np.stack([level * np.cos(turn), level * np.sin(turn), z], 1).astype(np.float32)
+    # As wide as closes the shell: deviations of 0.6 times the distance between neighbours.
+    shell = from_points(ball, np.ones(3), 0.6 * (4 * np.pi / count) ** 0.5, opacity=0.9)
+    spacing = 0.1
+    added = fill_interior(shell, FillingConfig(spacing))
+    cells = 4 / 3 * np.pi / spacing**3
+    assert 0.95 * cells < len(added) + count < 1.6 * cells + count
+    middle = np.linalg.norm(added, axis=1) < 0.7
+    assert middle.sum() > 0.9 * cells * 0.7**3
+    # Negative control: a threshold that suits the dense shell leaves the sparse one hollow.
+    fixed = fill_interior(shell, FillingConfig(spacing, density_threshold=2.0))
+    hollow = np.linalg.norm(fixed, axis=1) < 0.7
+    assert (hollow.sum() < 0.5 * middle.sum()) == (count == 900)
