@@ -53,6 +53,17 @@ def samples_seen(lines: list[dict], step: int) -> int:
     return sum((end - start) * batch for (start, batch), end in zip(pieces, ends, strict=True))
 
 
+def pieces(lines: list[dict], step: int) -> list[dict]:
+    """First step, batch and learning rate of each piece of a run, where one of them changes."""
+    found: list[dict] = []
+    for line in lines:
+        if "start" in line and line["start"] < step:
+            settings = {key: line["options"][key] for key in ("batch", "learning_rate")}
+            if not found or any(found[-1][key] != value for key, value in settings.items()):
+                found.append({"start": line["start"], **settings})
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("name", choices=sorted(KINDS))
@@ -89,6 +100,7 @@ def main() -> None:
             config=asdict(config),
             steps=step,
             samples=samples_seen(lines, step),
+            pieces=pieces(lines, step),
             seed=trained["seed"],
             held_out=reports[-1]["held_out"],
             held_out_no_text=reports[-1]["held_out_no_text"],
