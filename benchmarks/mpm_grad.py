@@ -1,9 +1,9 @@
 """Suite 'mpm-grad': value and gradient of a rollout, its cost in forward rollouts, and the peer.
 
-The gradient is that of the mean square position by every particle's Young's modulus, ours through
-checkpointed segments. Work is counted in particle-steps. The peer in
-`benchmarks/peers/taichi_mpm_grad.py` keeps every step, and is left out where that takes more memory
-than `PEER_BYTES`.
+The gradient is that of the mean square position by every particle's Young's modulus. Where memory
+allows, ours keeps every step (`Plain`) and is measured with checkpointed segments beside it. Work
+is counted in particle-steps. The peer in `benchmarks/peers/taichi_mpm_grad.py` keeps every step,
+and is left out where that takes more memory than `PEER_BYTES`.
 """
 
 from functools import partial
@@ -20,8 +20,15 @@ PEER_BYTES = 8 * 2**30
 LONG = 1000
 
 
+def gradient(case: dict, steps: int, adjoint: str):
+    """`value_and_gradient` of the mpm suite with the adjoint of that name."""
+    from jaxphys.mpm import adjoint as adjoints
+
+    return value_and_gradient(case, steps, getattr(adjoints, adjoint)())
+
+
 def prepare(program, cells: int, nodes: int, steps: int) -> Prepared:
-    """`program` is `forward` or `value_and_gradient` of the mpm suite."""
+    """`program(case, steps)` gives what is timed."""
     import jax
 
     run = program(block_case(cells, nodes), steps)
@@ -45,10 +52,13 @@ def cases(quick: bool) -> list[Case]:
     found = []
     for size, numbers in (QUICK_SIZES if quick else SIZES).items():
         cells, nodes, steps = numbers
+        plain, checkpointed = (partial(gradient, adjoint=a) for a in ("Plain", "Checkpointed"))
         methods = {
-            "jaxphys": partial(prepare, value_and_gradient, *numbers),
+            "jaxphys": partial(prepare, checkpointed if steps >= LONG else plain, *numbers),
             "jaxphys-forward": partial(prepare, forward, *numbers),
         }
+        if steps < LONG:
+            methods["jaxphys-checkpointed"] = partial(prepare, checkpointed, *numbers)
         if field_bytes(8 * cells**3, nodes, steps) <= PEER_BYTES:
             methods["taichi"] = partial(prepare_peer, *numbers)
         found += [

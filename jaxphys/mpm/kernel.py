@@ -22,14 +22,16 @@ def inside(position: Array, spacing: float, shape: tuple[int, int, int]) -> Arra
 
 
 def weights(offset: Array) -> tuple[Array, Array, Array]:
-    """Weights of the three nodes. `offset` is (x - x_base) / spacing in [0.5, 1.5), any shape."""
-    return (
-        0.5 * (1.5 - offset) ** 2,
-        0.75 - (offset - 1.0) ** 2,
-        0.5 * (offset - 0.5) ** 2,
-    )
+    """Weights, their slopes and the distances of the three nodes, each (..., 3, N).
 
+    offset: (..., N), (x - x_base) / spacing in [0.5, 1.5). Slopes are by `offset`: divided by the
+    spacing they are those by position [1/m]. Distances are x_node - x in spacings.
 
-def weight_slopes(offset: Array) -> tuple[Array, Array, Array]:
-    """Derivatives of `weights` by `offset`: divide by the spacing for those by position [1/m]."""
-    return offset - 1.5, 2.0 - 2.0 * offset, offset - 0.5
+    One formula for the three nodes, 3/4 - d^2 in the middle and (3/2 - |d|)^2 / 2 beside it, rather
+    than three arrays joined: XLA computes what is joined element by element.
+    """
+    node = jnp.arange(3, dtype=offset.dtype)[:, None]
+    distance = node - offset[..., None, :]
+    middle = node == 1
+    slope = jnp.where(middle, 2 * distance, 1.5 * (node - 1) - distance)
+    return jnp.where(middle, 0.75 - distance**2, 0.5 * slope**2), slope, distance

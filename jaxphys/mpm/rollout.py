@@ -9,7 +9,7 @@ from jax import Array
 
 from jaxphys.core.errors import InputError
 
-from .adjoint import Adjoint, Plain, for_frames, repeat
+from .adjoint import Adjoint, Plain, for_frames, lean, repeat
 from .state import (
     LEFT_GRID,
     LEFT_WINDOW,
@@ -93,7 +93,7 @@ def rollout(
     Pure and free of host traffic: jit it, differentiate it. The status tells the first failing
     step and particle; `check` turns it into an exception.
     """
-    end = repeat(adjoint, lambda s: step(config, model, s, dt), state, steps)
+    end = repeat(adjoint, lean(lambda s: step(config, model, s, dt)), state, steps)
     return _keep_good(state, end)
 
 

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 from jax import Array
 
+from jaxphys.core import algebra
 from jaxphys.core.errors import InputError
 
 from .boundaries import GridBoundary
@@ -135,11 +136,7 @@ def move_particles(model: Model, state: State, velocity: Array, dt: Array) -> Ar
 
 def advance_gradient(F: Array, C: Array, dt: Array) -> Array:
     """(I + dt C) F for (3, 3, N). Written as F + dt C F, which keeps small strains exact."""
-    product = [
-        [C[i, 0] * F[0, j] + C[i, 1] * F[1, j] + C[i, 2] * F[2, j] for j in range(3)]
-        for i in range(3)
-    ]
-    return F + dt * jnp.stack([jnp.stack(row) for row in product])
+    return F + dt * algebra.matmul(C, F)
 
 
 def judge(

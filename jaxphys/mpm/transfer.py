@@ -21,10 +21,12 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 from jax import Array
+from jax.ad_checkpoint import checkpoint_name
 
-from .kernel import base_node, weight_slopes, weights
+from .kernel import base_node, weights
 
 Shape = tuple[int, int, int]
+TRANSFERS = "transfers"  # what `adjoint.lean` keeps
 
 
 def particle_to_grid(
@@ -76,11 +78,11 @@ def window_origin(shape: Shape, spacing: float, grid_shape: Shape, position: Arr
 
 
 class _Stencil(NamedTuple):
-    """Where the 27 nodes of each particle are. Arrays (axis, node 0 to 2, N, 1)."""
+    """Where the 27 nodes of each particle are. Arrays (axis, node 0 to 2, N)."""
 
     row: Array  # (N,) int32, row number of the first node
-    weight: Array  # w_k(x) per axis
-    moment: Array  # w_k(x) (x_k - x_p) per axis [m]
+    weight: Array  # w_k(x)
+    moment: Array  # w_k(x) (x_k - x_p) [m]
     slope: Array  # derivative of w_k by x_p [1/m]
     distance: Array  # x_k - x_p [m]
 
@@ -96,10 +98,9 @@ def _stencil(static, origin, position) -> _Stencil:
         last = jnp.array(shape, dtype=jnp.int32)[:, None] - 3
         local = jnp.clip(base - origin[:, None], 0, last)
     row = (local[0] * shape[1] + local[1]) * shape[2] + local[2]
-    weight = jnp.stack(weights(offset), axis=1)[..., None]
-    slope = jnp.stack(weight_slopes(offset), axis=1)[..., None] / spacing
-    distance = jnp.stack([(k - offset) * spacing for k in range(3)], axis=1)[..., None]
-    return _Stencil(row, weight, weight * distance, slope, distance)
+    weight, slope, distance = weights(offset)
+    distance = distance * spacing
+    return _Stencil(row, weight, weight * distance, slope / spacing, distance)
 
 
 def _rows(vectors: Array, last: Array | None = None) -> Array:
@@ -117,7 +118,7 @@ def _scatter(static, origin, position, mass, momentum, affine):
     shape = static[0]
     plane, line = shape[1] * shape[2], shape[2]
     stencil = _stencil(static, origin, position)
-    (wx, wy, wz), (mx, my, mz) = stencil.weight, stencil.moment
+    (wx, wy, wz), (mx, my, mz) = stencil.weight[..., None], stencil.moment[..., None]
     value = _rows(momentum, mass)
     along = [_rows(affine[:, axis]) for axis in range(3)]
 
@@ -137,59 +138,70 @@ def _scatter(static, origin, position, mass, momentum, affine):
     return jax.lax.fori_loop(0, 3, add_plane, rows)
 
 
-def _gather(static, origin, position, rows):
-    """Sums of w g (4, N), and of w g d^T for the first three columns (3, 3, N)."""
+def _over_planes(static, stencil, rows, terms, nothing):
+    """Sum over the three planes a of the stencil of `terms(a, nodes)`, where nodes[b][c] are the
+    rows (N, 4) at node (a, b, c) of each particle; `nothing` is the zero to start from.
+    """
     shape = static[0]
     plane, line = shape[1] * shape[2], shape[2]
-    stencil = _stencil(static, origin, position)
-    (wx, wy, wz), (mx, my, mz) = stencil.weight, stencil.moment
 
-    def add_plane(a, sums):
+    def add_plane(a, totals):
         first = stencil.row + a * plane
+        nodes = [[_read(rows, first + (b * line + c)) for c in range(3)] for b in range(3)]
+        return jax.tree.map(jnp.add, totals, terms(a, nodes))
+
+    return jax.lax.fori_loop(0, 3, add_plane, nothing)
+
+
+def _sum_terms(stencil):
+    """Terms of the sums of w g and of w g d along x, y and z, each (N, 4)."""
+    (wx, wy, wz), (mx, my, mz) = stencil.weight[..., None], stencil.moment[..., None]
+
+    def terms(a, nodes):
         w = m = z = 0.0
         for b in range(3):
-            nodes = [_read(rows, first + (b * line + c)) for c in range(3)]
-            along = wz[0] * nodes[0] + wz[1] * nodes[1] + wz[2] * nodes[2]
+            along = sum(wz[c] * nodes[b][c] for c in range(3))
             w, m = w + wy[b] * along, m + my[b] * along
-            z = z + wy[b] * (mz[0] * nodes[0] + mz[1] * nodes[1] + mz[2] * nodes[2])
-        terms = (wx[a] * w, mx[a] * w, wx[a] * m, wx[a] * z)
-        return tuple(total + term for total, term in zip(sums, terms, strict=True))
+            z = z + wy[b] * sum(mz[c] * nodes[b][c] for c in range(3))
+        return wx[a] * w, mx[a] * w, wx[a] * m, wx[a] * z
 
-    nothing = jnp.zeros((position.shape[1], 4), position.dtype)
-    sums, *moments = jax.lax.fori_loop(0, 3, add_plane, (nothing,) * 4)
+    return terms, (jnp.zeros((len(stencil.row), 4), wx.dtype),) * 4
+
+
+def _slope_terms(stencil, mass, momentum, affine):
+    """Terms of the sums of grad w (g . (a + A d, m)) along x, y and z, each (N,).
+
+    Nothing is written to the grid here, and a node counts by one number per particle: the particle
+    axis comes last, and the columns of a node's row are read one by one.
+    """
+    (wx, wy, wz), (sx, sy, sz) = stencil.weight, stencil.slope
+    dx, dy, dz = stencil.distance
+
+    def terms(a, nodes):
+        w = s = z = 0.0
+        for b in range(3):
+            constant = momentum + dx[a] * affine[:, 0] + dy[b] * affine[:, 1]
+            pairs = []
+            for c in range(3):
+                node, value = nodes[b][c], constant + dz[c] * affine[:, 2]
+                pair = sum(node[:, i] * value[i] for i in range(3))
+                pairs.append(pair if mass is None else pair + node[:, 3] * mass)
+            weighted = sum(wz[c] * pairs[c] for c in range(3))
+            w, s = w + wy[b] * weighted, s + sy[b] * weighted
+            z = z + wy[b] * sum(sz[c] * pairs[c] for c in range(3))
+        return sx[a] * w, wx[a] * s, wx[a] * z
+
+    return terms, (jnp.zeros_like(wx[0]),) * 3
+
+
+def _particle_last(sums, moments):
+    """(4, N), and (3, 3, N) of the first three columns, from rows."""
     return sums.T, jnp.stack([moment.T[:3] for moment in moments], axis=1)
 
 
-def _slope(static, origin, position, rows, mass, momentum, affine, sums):
-    """Derivative (3, N) by x_p of sum_i g_i . w (a + A d, m), given the sums of w g (4, N)."""
-    shape = static[0]
-    plane, line = shape[1] * shape[2], shape[2]
-    stencil = _stencil(static, origin, position)
-    (wx, wy, wz), (sx, sy, sz) = stencil.weight, stencil.slope
-    dx, dy, dz = stencil.distance
-    value = _rows(momentum, mass)
-    along = [_rows(affine[:, axis]) for axis in range(3)]
-
-    def add_plane(a, slopes):
-        first = stencil.row + a * plane
-        w = s = z = 0.0
-        for b in range(3):
-            constant = value + dx[a] * along[0] + dy[b] * along[1]
-            pairs = [
-                _read(rows, first + (b * line + c)) * (constant + dz[c] * along[2])
-                for c in range(3)
-            ]
-            weighted = wz[0] * pairs[0] + wz[1] * pairs[1] + wz[2] * pairs[2]
-            w, s = w + wy[b] * weighted, s + sy[b] * weighted
-            z = z + wy[b] * (sz[0] * pairs[0] + sz[1] * pairs[1] + sz[2] * pairs[2])
-        terms = (sx[a] * w, wx[a] * s, wx[a] * z)
-        return tuple(total + term for total, term in zip(slopes, terms, strict=True))
-
-    nothing = jnp.zeros((position.shape[1], 4), position.dtype)
-    slopes = jax.lax.fori_loop(0, 3, add_plane, (nothing,) * 3)
-    through_weights = jnp.stack([jnp.sum(slope, axis=1) for slope in slopes])
-    through_distance = sum(affine[i] * sums[i] for i in range(3))
-    return through_weights - through_distance
+def _through_position(slopes, affine, sums):
+    """Derivative (3, N) by x_p: through the weights, and through d = x_i - x_p."""
+    return jnp.stack(slopes) - sum(affine[i] * sums[i] for i in range(3))
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
@@ -198,18 +210,35 @@ def _to_grid(static, origin, position, mass, momentum, affine):
 
 
 def _to_grid_forward(static, origin, position, mass, momentum, affine):
-    rows = _scatter(static, origin, position, mass, momentum, affine)
+    rows = checkpoint_name(_scatter(static, origin, position, mass, momentum, affine), TRANSFERS)
     return rows, (origin, position, mass, momentum, affine)
 
 
 def _to_grid_backward(static, kept, cotangent):
     origin, position, mass, momentum, affine = kept
-    sums, moments = _gather(static, origin, position, cotangent)
-    slope = _slope(static, origin, position, cotangent, mass, momentum, affine, sums)
-    return None, slope, sums[3], sums[:3], moments
+    stencil = _stencil(static, origin, position)
+    sum_terms, no_sums = _sum_terms(stencil)
+    slope_terms, no_slopes = _slope_terms(stencil, mass, momentum, affine)
+    # In one loop, for the sake of the rows read.
+    (sums, *moments), slopes = _over_planes(
+        static,
+        stencil,
+        cotangent,
+        lambda a, nodes: (sum_terms(a, nodes), slope_terms(a, nodes)),
+        (no_sums, no_slopes),
+    )
+    sums, moments = _particle_last(sums, moments)
+    return None, _through_position(slopes, affine, sums), sums[3], sums[:3], moments
 
 
 _to_grid.defvjp(_to_grid_forward, _to_grid_backward)
+
+
+def _gather(static, origin, position, rows):
+    """Sums of w g (4, N), and of w g d^T for the first three columns (3, 3, N)."""
+    stencil = _stencil(static, origin, position)
+    sums, *moments = _over_planes(static, stencil, rows, *_sum_terms(stencil))
+    return _particle_last(sums, moments)
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
@@ -219,14 +248,16 @@ def _to_particle(static, origin, position, rows):
 
 
 def _to_particle_forward(static, origin, position, rows):
-    sums, moments = _gather(static, origin, position, rows)
+    sums, moments = checkpoint_name(_gather(static, origin, position, rows), TRANSFERS)
     return (sums[:3], moments), (origin, position, rows, sums)
 
 
 def _to_particle_backward(static, kept, cotangents):
     origin, position, rows, sums = kept
     velocity, moment = cotangents
-    slope = _slope(static, origin, position, rows, None, velocity, moment, sums)
+    stencil = _stencil(static, origin, position)
+    slopes = _over_planes(static, stencil, rows, *_slope_terms(stencil, None, velocity, moment))
+    slope = _through_position(slopes, moment, sums)
     return None, slope, _scatter(static, origin, position, None, velocity, moment)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.kernel import base_node, inside, weight_slopes, weights
+from jaxphys.mpm.kernel import base_node, inside, weights
 from jaxphys.mpm.transfer import grid_to_particle, particle_to_grid, window_origin
 
 from . import reference
@@ -43,20 +43,26 @@ def to_particle(position, velocity, shape=GRID.shape, origin=ZERO):
 
 def test_weights_are_a_partition_of_unity_and_reproduce_position():
     offset = jnp.linspace(0.5, 1.5, 101)
-    w, s = weights(offset), weight_slopes(offset)
+    w, s, d = weights(offset)
     np.testing.assert_allclose(sum(w), 1.0, atol=1e-15)
     np.testing.assert_allclose(w[1] + 2 * w[2], offset, atol=1e-15)
-    second_moment = sum(w[k] * (k - offset) ** 2 for k in range(3))
-    np.testing.assert_allclose(second_moment, 0.25, atol=1e-15)  # hence C = 4 / dx^2 B
-    for k in range(3):
-        slope = jax.vmap(jax.grad(lambda x, k=k: weights(x)[k]))(offset)
-        np.testing.assert_allclose(s[k], slope, atol=1e-15)
+    np.testing.assert_allclose(d, np.arange(3)[:, None] - offset, atol=1e-15)
+    np.testing.assert_allclose(sum(w * d**2), 0.25, atol=1e-15)  # hence C = 4 / dx^2 B
+    slope = jax.jvp(lambda x: weights(x)[0], (offset,), (jnp.ones_like(offset),))[1]
+    np.testing.assert_allclose(s, slope, atol=1e-15)
 
 
 def test_weights_are_continuous_across_cells():
-    left, right = weights(jnp.array(1.5)), weights(jnp.array(0.5))
-    np.testing.assert_allclose([left[1], left[2]], [right[0], right[1]], atol=1e-15)
-    assert left[0] == 0 and right[2] == 0
+    (left, left_slope, _), (right, right_slope, _) = (
+        weights(jnp.array([[offset]])) for offset in (1.5, 0.5)
+    )
+    assert left.shape == (1, 3, 1)
+    left, right, left_slope, right_slope = (
+        a[0, :, 0] for a in (left, right, left_slope, right_slope)
+    )
+    np.testing.assert_allclose(left[1:], right[:2], atol=1e-15)
+    np.testing.assert_allclose(left_slope[1:], right_slope[:2], atol=1e-15)
+    assert left[0] == left_slope[0] == 0 and right[2] == right_slope[2] == 0
 
 
 def test_to_grid_is_the_dense_sum():
