@@ -14,10 +14,13 @@ from jax import Array, lax
 
 from .projection import Projected
 from .settings import REFERENCE_TILE, Settings
+from .sorting import group_stably, stable_order
 
 # Pairs are counted in int32; a picture that needs more than this is not drawn, and says so.
 MOST_PAIRS = 2**30
 UNCOUNTABLE = 2**31 - 1
+# Pairs are emitted and sorted in so many parts, which XLA's CPU backend works on side by side.
+PARTS = 2
 
 
 class Grid(NamedTuple):
@@ -74,8 +77,8 @@ def depth_order(depths: Array, valid: Array) -> Array:
     """Indices of splats by increasing depth, equal depths by index, those not drawn last."""
     far = jnp.where(valid, depths, jnp.inf)
     if far.dtype == jnp.float32:
-        # Positive floats are ordered as their bits are, and integers sort faster.
-        far = lax.bitcast_convert_type(far, jnp.uint32)
+        # Positive floats are ordered as their bits are, of which the sign is zero.
+        return stable_order(lax.bitcast_convert_type(far, jnp.uint32), bits=31)
     return jnp.argsort(far, stable=True).astype(jnp.int32)
 
 
@@ -137,37 +140,43 @@ def tile_lists(
     with the rank as payload, which gives the same lists since pairs are emitted in depth order.
     """
     count = boxes.order.shape[0]
-    slots = jnp.arange(capacity, dtype=jnp.int32)
-    owners = slot_owners(boxes, capacity)
-    rows = jnp.stack([boxes.starts, boxes.left, boxes.top, boxes.columns], axis=-1)
-    start, left, top, columns = rows[owners].T
-    local = slots - start
-    down = local // jnp.maximum(columns, 1)
-    column, row = left + local - down * columns, top + down
-    kept = (slots < boxes.required) & _meets(projected, boxes, owners, column, row, grid, settings)
-    tiles = jnp.where(kept, row * grid.columns + column, grid.tiles)
+    owners = slot_owners(boxes.starts, boxes.counts, capacity)
+    table = jnp.stack([boxes.starts, boxes.left, boxes.top, boxes.columns], axis=-1)
 
-    boundaries = jnp.arange(grid.tiles + 1)
+    def emit(slots: Array, owners: Array) -> tuple[Array, Array]:
+        """Tile and owner of each slot, tile `grid.tiles` where there is none."""
+        start, left, top, columns = table[owners].T
+        local = slots - start
+        down = local // jnp.maximum(columns, 1)
+        column, row = left + local - down * columns, top + down
+        meets = _meets(projected, boxes, owners, column, row, grid, settings)
+        kept = (slots < boxes.required) & meets
+        return jnp.where(kept, row * grid.columns + column, grid.tiles), owners
+
+    slots = jnp.arange(capacity, dtype=jnp.int32)
+    parts = [emit(*part) for part in zip(_split(slots), _split(owners), strict=True)]
     if (grid.tiles + 1) * count <= 2**32:
-        keys = tiles.astype(jnp.uint32) * jnp.uint32(count) + owners.astype(jnp.uint32)
-        keys = jnp.sort(keys)
-        offsets = jnp.searchsorted(keys, boundaries.astype(jnp.uint32) * jnp.uint32(count))
-        ranks = (keys % jnp.uint32(count)).astype(jnp.int32)
-    else:
-        keys, ranks = lax.sort((tiles, owners), num_keys=1, is_stable=True)
-        offsets = jnp.searchsorted(keys, boundaries.astype(jnp.int32))
+        return TileLists(*group_stably(parts, grid.tiles, count))
+    tiles = jnp.concatenate([tiles for tiles, _ in parts])
+    keys, ranks = lax.sort((tiles, owners), num_keys=1, is_stable=True)
+    offsets = jnp.searchsorted(keys, jnp.arange(grid.tiles + 1, dtype=jnp.int32))
     return TileLists(ranks, offsets.astype(jnp.int32))
 
 
-def slot_owners(boxes: Boxes, capacity: int) -> Array:
-    """Depth rank of the splat that owns each emission slot, shape (capacity,)."""
-    # Ranks of splats that emit anything are written where their runs start and carried forward.
-    count = boxes.order.shape[0]
-    where = jnp.where(boxes.counts > 0, boxes.starts, capacity)
+def _split(slots: Array) -> list[Array]:
+    return jnp.array_split(slots, PARTS)
+
+
+def slot_owners(starts: Array, counts: Array, capacity: int) -> Array:
+    """Which of the contiguous runs, at `starts` (N,) and `counts` (N,) long, owns each slot,
+    shape (capacity,); slots behind the last run count as its own.
+    """
+    # Runs that hold anything are written where they start and carried forward.
+    where = jnp.where(counts > 0, starts, capacity)
     marks = (
         jnp.zeros(capacity, jnp.int32)
         .at[where]
-        .set(jnp.arange(count, dtype=jnp.int32), mode="drop")
+        .set(jnp.arange(counts.shape[0], dtype=jnp.int32), mode="drop")
     )
     return lax.cummax(marks)
 

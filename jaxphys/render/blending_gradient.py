@@ -90,7 +90,7 @@ def blend_backward(grid, settings, residuals, cotangent):
     blank = jnp.zeros((capacity, width), dtype)
     busy = busy_groups(work)
     slots = lax.while_loop(lambda c: c[0] < busy, finish_group, (jnp.int32(0), blank))[1]
-    by_rank = _sum_runs(slots, boxes, grid)
+    by_rank = _sum_runs(slots, boxes)
     count = boxes.order.shape[0]
     rank_of = (
         jnp.zeros(count, jnp.int32)
@@ -166,30 +166,33 @@ def _emission_slots(boxes: Boxes, ranks: Array, group: Work, grid: Grid, capacit
     return jnp.where(ranks >= 0, slot, beyond)
 
 
-def _sum_runs(slots: Array, boxes: Boxes, grid: Grid) -> Array:
+def _sum_runs(slots: Array, boxes: Boxes) -> Array:
     """Sums the contiguous slots of each splat: (capacity, K) -> (N, K).
 
-    Eight neighbours at distance 1, 8, 64, ... inside a run are added in turn, until the longest run
-    has collapsed onto its first slot: a tree of fixed shape, whatever the device.
+    Eight neighbours of a run are added in turn, and their sums lie together again as a shorter run,
+    until one is left of each: a tree of fixed shape, whatever the device.
     """
-    capacity = slots.shape[0]
-    owners = slot_owners(boxes, capacity)
-    local = jnp.arange(capacity, dtype=jnp.int32) - boxes.starts[owners]
-    counts = boxes.counts[owners]
+    capacity, count = slots.shape[0], boxes.counts.shape[0]
+    counts = jnp.clip(capacity - boxes.starts, 0, boxes.counts)
+    room = -(-capacity // FOLD) + count
+    runs = _fold(slots, boxes.starts, counts, room)
+    sums, starts, counts = lax.while_loop(
+        lambda runs: jnp.max(runs[2]) > 1, lambda runs: _fold(*runs, room), runs
+    )
+    first = jnp.minimum(starts, room - 1)
+    return jnp.where((counts > 0)[:, None], sums[first], 0)
 
-    def fold(carry):
-        distance, slots = carry
-        summed = slots[:capacity]
-        for k in range(1, FOLD):
-            shifted = lax.dynamic_slice_in_dim(slots, k * distance, capacity)
-            takes = (local % (FOLD * distance) == 0) & (local + k * distance < counts)
-            summed = summed + jnp.where(takes[:, None], shifted, 0)
-        return FOLD * distance, lax.dynamic_update_slice_in_dim(slots, summed, 0, 0)
 
-    longest = jnp.max(boxes.counts)
-    # Room for the largest distance within a run; a slice that starts beyond takes part in nothing.
-    slots = jnp.pad(slots, ((0, 1 << grid.tiles.bit_length()), (0, 0)))
-    _, slots = lax.while_loop(lambda carry: carry[0] < longest, fold, (jnp.int32(1), slots))
-    first = jnp.minimum(boxes.starts, capacity - 1)
-    drawn = (boxes.counts > 0) & (boxes.starts < capacity)
-    return jnp.where(drawn[:, None], slots[first], 0)
+def _fold(slots: Array, starts: Array, counts: Array, room: int) -> tuple[Array, Array, Array]:
+    """Sums of up to eight neighbours of each run, (room, K), and where the shorter runs lie."""
+    shorter = -(-counts // FOLD)
+    ends = jnp.cumsum(shorter, dtype=jnp.int32)
+    begins = ends - shorter
+    owners = slot_owners(begins, shorter, room)
+    done = FOLD * (jnp.arange(room, dtype=jnp.int32) - begins[owners])
+    first, left = starts[owners] + done, counts[owners] - done
+    summed = 0.0
+    for k in range(FOLD):
+        row = slots.at[first + k].get(mode="clip")
+        summed = summed + jnp.where((k < left)[:, None], row, 0)
+    return summed, begins, shorter

@@ -186,6 +186,24 @@ def watermelon(rng):
     ]
 
 
+def tuft(rng, height, rises, width, green, droop):
+    """A leaf from (0, 0, height) for each of `rises`, the upward part of its direction, turned from
+    one to the next by the golden angle.
+    """
+    angles = 2.39996 * np.arange(len(rises))
+    return [
+        leaf(
+            (0, 0, height),
+            (np.cos(angle), np.sin(angle), rise),
+            0.42,
+            width,
+            green * rng.uniform(0.8, 1.2),
+            droop=droop,
+        )
+        for angle, rise in zip(angles, rises, strict=True)
+    ]
+
+
 def pineapple(rng):
     """A pineapple with a checkered skin and a tuft."""
     skin, green = jitter(rng, (0.88, 0.63, 0.16)), jitter(rng, COLOURS["green"])
@@ -202,18 +220,8 @@ def pineapple(rng):
             rows=96,
         )
     ]
-    for index in range(22):
-        angle, rise = 2.39996 * index, 0.4 + 2.2 * (1 - index / 22)
-        parts.append(
-            leaf(
-                (0, 0, 0.26),
-                (np.cos(angle), np.sin(angle), rise),
-                0.42,
-                0.09,
-                green * rng.uniform(0.8, 1.2),
-                droop=0.35,
-            )
-        )
+    rises = 0.4 + 2.2 * (1 - np.arange(22) / 22)
+    parts += tuft(rng, 0.26, rises, 0.09, green, droop=0.35)
     return join(*parts), ["a pineapple", "a ripe pineapple with green leaves"]
 
 
@@ -256,18 +264,7 @@ def carrot(rng):
     parts = [
         lathe([(0, -0.6), (0.03, -0.55), (0.1, -0.2), (0.16, 0.2), (0.12, 0.28), (0, 0.27)], paint)
     ]
-    for index in range(9):
-        angle = 2.39996 * index
-        parts.append(
-            leaf(
-                (0, 0, 0.25),
-                (np.cos(angle), np.sin(angle), 2.2),
-                0.42,
-                0.12,
-                green * rng.uniform(0.8, 1.2),
-                droop=0.2,
-            )
-        )
+    parts += tuft(rng, 0.25, np.full(9, 2.2), 0.12, green, droop=0.2)
     return join(*parts), ["a carrot", "an orange carrot with green leaves"]
 
 
