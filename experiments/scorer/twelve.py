@@ -6,8 +6,9 @@
 FOLDER holds strawberry/gaussians.ply, ice_cream/gaussians.ply and so on; with --generate what is
 missing is made from its sentence (experiments/scorer/sentences.py) and written there. Eight views
 of each object are drawn with `jaxphys.render` and each is scored against the twelve sentences.
-Prints the table, writes it to FOLDER/twelve.json and the pictures to FOLDER/twelve.png (red edges:
-not ranked first), and ends with status 0 whatever the table says, 2 where there is none.
+Prints the table, writes it to FOLDER/twelve.json, the pictures to FOLDER/twelve.png (red edges: not
+ranked first) and half of them, unmarked, to FOLDER/overview.png. Ends with status 0 whatever the
+table says, 2 where there is none.
 """
 
 from __future__ import annotations
@@ -107,6 +108,13 @@ def contact_sheet(pictures: np.ndarray, first: np.ndarray) -> np.ndarray:
     return np.rint(255 * sheet).astype(np.uint8)
 
 
+def overview(pictures: np.ndarray) -> np.ndarray:
+    """Every other view of (12, 8, H, W, 3) in two columns of six prompts, one uint8 picture."""
+    left, right = np.split(pictures[:, ::2], 2)
+    both = np.concatenate([left, right], axis=1)
+    return contact_sheet(both, np.ones(both.shape[:2], bool))
+
+
 def run(folder: Path, scorer: Scorer) -> list[Row]:
     """Draws and ranks what lies in `folder`, and writes twelve.json and twelve.png there."""
     missing = [str(path_of(folder, p)) for p in SENTENCES if not path_of(folder, p).exists()]
@@ -129,8 +137,13 @@ def run(folder: Path, scorer: Scorer) -> list[Row]:
             "similarities": np.round(scores, 4).tolist(),
         },
     )
-    with atomic_path(folder / "twelve.png") as aside:
-        Image.fromarray(contact_sheet(pictures, ranked_first(scores))).save(aside)
+    sheets = {
+        "twelve": contact_sheet(pictures, ranked_first(scores)),
+        "overview": overview(pictures),
+    }
+    for name, sheet in sheets.items():
+        with atomic_path(folder / f"{name}.png") as aside:
+            Image.fromarray(sheet).save(aside, optimize=True)
     return rows
 
 

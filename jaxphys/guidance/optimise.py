@@ -62,20 +62,20 @@ class OptimiseConfig:
     count: int = 2048
     spare: float = 0.1
     room: float = 1.25
-    steps: int = 240
+    steps: int = 160
     views: int = 4
     sampling: SamplingConfig = SamplingConfig()
     image: DistillationConfig = DistillationConfig(
-        guidance=10.0, rescale=0.7, weight="clean", time=(0.05, 0.6, 0.3)
+        guidance=25.0, rescale=0.0, weight="clean", time=(0.02, 0.25, 0.1)
     )
     point: DistillationConfig = DistillationConfig(
-        guidance=3.0, rescale=0.7, weight="clean", time=(0.02, 0.4, 0.1)
+        guidance=3.0, rescale=0.7, weight="clean", time=(0.02, 0.12, 0.05)
     )
     image_weight: float = 1.0
     point_weight: float = 0.5
     regular_weight: float = 1.0
     rates: tuple[tuple[str, float], ...] = (
-        ("means", 2e-3),
+        ("means", 4e-4),
         ("log_scales", 6e-3),
         ("quaternions", 6e-3),
         ("opacity_logits", 2e-2),

@@ -199,6 +199,15 @@ def test_sheet_marks_what_is_not_first():
     assert red.sum() == 16 * 16 - 12 * 12
 
 
+def test_overview_has_two_columns_of_every_other_view():
+    pictures = np.linspace(0, 1, 12 * 8).reshape(12, 8, 1, 1, 1) * np.ones((12, 8, 4, 4, 3))
+    sheet = twelve.overview(pictures)
+    assert sheet.shape == (6 * 4, 8 * 4, 3)
+    values = np.rint(255 * np.linspace(0, 1, 12 * 8)).reshape(12, 8)
+    np.testing.assert_array_equal(sheet[::4, ::4, 0][:, :4], values[:6, ::2])
+    np.testing.assert_array_equal(sheet[::4, ::4, 0][:, 4:], values[6:, ::2])
+
+
 def test_a_missing_object_is_named(tmp_path):
     with pytest.raises(InputError, match=r"strawberry/gaussians\.ply: is missing"):
         twelve.run(tmp_path, model.Scorer(rngs=nnx.Rngs(0)))
