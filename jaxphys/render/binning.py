@@ -2,9 +2,9 @@
 
 Splats are sorted by depth once. Each then emits one pair (tile, depth rank) for every tile of its
 box, so that pairs lie in depth order, into an array of `capacity` slots; sorting the single integer
-`tile * N + rank` gives every tile a contiguous run in depth order. All of it is exact: depths
-are compared with all their bits and no list is cut short, unless the capacity is too small, which
-is reported and leaves out the farthest pairs.
+`tile * N + rank`, in two halves that are then merged, gives every tile a contiguous run in depth
+order. All of it is exact: depths are compared with all their bits and no list is cut short, unless
+the capacity is too small, which is reported and leaves out the farthest pairs.
 """
 
 from typing import NamedTuple

@@ -1,5 +1,5 @@
-"""Sorts for the CPU, where XLA sorts one array of integers on one core, and a key with a payload at
-a quarter of that speed. Both are exact, and no slower elsewhere.
+"""Exact sorts shaped for XLA's CPU backend, which sorts one array of integers on one core, and a key
+with a payload at a quarter of that speed.
 """
 
 from collections.abc import Sequence
