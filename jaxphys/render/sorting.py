@@ -1,5 +1,5 @@
-"""Exact sorts shaped for XLA's CPU backend, which sorts one array of integers on one core, and a key
-with a payload at a quarter of that speed.
+"""Exact sorts shaped for XLA's CPU backend, which sorts one array of integers on one core, and a
+key with a payload at a quarter of that speed.
 """
 
 from collections.abc import Sequence
