@@ -102,6 +102,7 @@ def main() -> None:
             samples=samples_seen(lines, step),
             pieces=pieces(lines, step),
             seed=trained["seed"],
+            held_out_step=reports[-1]["step"],
             held_out=reports[-1]["held_out"],
             held_out_no_text=reports[-1]["held_out_no_text"],
         )
