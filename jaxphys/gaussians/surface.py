@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.gaussians.mesh import Mesh
+from jaxphys.gaussians.thinning import thin
 
 # Candidates per sample wanted, before the crowded ones are thinned out.
 _OVERSAMPLING = 3
@@ -99,24 +100,6 @@ def _draw(mesh: Mesh, areas: np.ndarray, count: int, spacing: float, random) -> 
     return face[present], weights[present], colour[present]
 
 
-def _thin(features: np.ndarray, count: int) -> np.ndarray:
-    """Indices of `count` well spread rows: in rounds, of close pairs the tighter lose one each.
-
-    A parallel form of sample elimination (Yuksel 2015). Each round drops at most a tenth of those
-    left, so that the distances it goes by stay current.
-    """
-    alive = np.arange(len(features))
-    while len(alive) > count:
-        distance, neighbour = cKDTree(features[alive]).query(features[alive], k=2)
-        nearest, other = distance[:, 1], neighbour[:, 1]
-        # One of a mutual pair is dropped, the other stays for this round.
-        loses = ~((other[other] == np.arange(len(alive))) & (other > np.arange(len(alive))))
-        order = np.argsort(np.where(loses, nearest, np.inf), kind="stable")
-        number = min(len(alive) - count, max(len(alive) // 10, 1), int(loses.sum()))
-        alive = np.delete(alive, order[:number])
-    return alive
-
-
 def sample_surface(mesh: Mesh, count: int, seed: int = 0) -> SurfaceSamples:
     """`count` evenly spread points of the surface; the same seed gives the same points.
 
@@ -143,7 +126,7 @@ def sample_surface(mesh: Mesh, count: int, seed: int = 0) -> SurfaceSamples:
         face, weights, colour = _draw(mesh, areas, int(wanted / share) + 1, spacing, random)
     points = np.einsum("nk,nkc->nc", weights, mesh.triangles[face])
     normals = doubled[face] / length[face, None]
-    kept = _thin(np.concatenate([points, spacing * normals], axis=1), count)
+    kept = thin(np.concatenate([points, spacing * normals], axis=1), count)
     points, normals = points[kept], normals[kept]
     return SurfaceSamples(
         points, normals, np.clip(colour[kept, :3], 0, 1), _spacing(points, normals, spacing)

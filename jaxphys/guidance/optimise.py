@@ -18,7 +18,6 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 from flax import nnx
-from scipy.spatial import cKDTree
 from tqdm import tqdm
 
 from jaxphys.core.errors import InputError
@@ -26,6 +25,7 @@ from jaxphys.gaussians.density import DensityConfig, carry_moments, control_dens
 from jaxphys.gaussians.gaussians import Gaussians, from_points, select
 from jaxphys.gaussians.harmonics import dc_to_rgb
 from jaxphys.guidance import views
+from jaxphys.guidance.clouds import even_subset
 from jaxphys.guidance.distillation import (
     DistillationConfig,
     image_distillation,
@@ -47,7 +47,7 @@ class OptimiseConfig:
 
     Attributes:
         count: Gaussians drawn from the point prior.
-        spare: so many more are drawn, as a share of `count`, and the most isolated left out.
+        oversampling: so many times `count` are drawn, for `clouds.even_subset` to choose from.
         room: capacity for density control, as a multiple of `count`.
         steps: of distillation; 0 leaves the sampled cloud as it is.
         views: pictures a step.
@@ -60,7 +60,7 @@ class OptimiseConfig:
     """
 
     count: int = 2048
-    spare: float = 0.1
+    oversampling: float = 3.0
     room: float = 1.25
     steps: int = 160
     views: int = 4
@@ -81,7 +81,7 @@ class OptimiseConfig:
         ("opacity_logits", 2e-2),
         ("harmonics", 1.5e-2),
     )
-    size: float = 0.6
+    size: float = 0.7
     opacity: float = 0.85
     largest: float = 0.04
     density_every: int = 80
@@ -110,27 +110,14 @@ class Guides(NamedTuple):
     text: Array
 
 
-def least_isolated(points: np.ndarray, count: int) -> np.ndarray:
-    """Indices of the `count` points of (N, 3) that stray least from their neighbours, in order.
-
-    A point strays as far as its neighbours are farther than theirs, a simple form of the local
-    outlier factor (Breunig et al. 2000): thin parts stay, floating points go.
-    """
-    near = min(9, len(points))
-    distance, neighbours = cKDTree(points).query(points, k=near)
-    mean = distance.reshape(len(points), near)[:, 1:].sum(1) + 1e-9
-    factor = mean / mean[neighbours.reshape(len(points), near)].mean(1)
-    return np.sort(np.argsort(factor, kind="stable")[:count])
-
-
 def initial_gaussians(guides: Guides, key: Array, config: OptimiseConfig) -> Gaussians:
-    """Gaussians at the points of a cloud drawn from the point prior."""
-    drawn = math.ceil(config.count * (1 + config.spare))
+    """Gaussians at evenly spread points of a cloud drawn from the point prior."""
+    drawn = math.ceil(config.count * config.oversampling)
     points, colours = sample_points(
         guides.point, guides.text[None], key, count=drawn, config=config.sampling
     )
     points, colours = np.asarray(points[0]), np.asarray(colours[0])
-    kept = least_isolated(points, config.count)
+    kept = even_subset(points, config.count)
     points, colours = points[kept], colours[kept]
     sizes = neighbour_sizes(points, config.size, config.largest)
     return from_points(points, colours, sizes, opacity=config.opacity)

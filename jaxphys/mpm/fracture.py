@@ -5,11 +5,9 @@ broken, and a count of the pieces it leaves.
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.parts import connected_parts
 from jaxphys.core.spectral import left_isotropic
 from jaxphys.mpm.elasticity import (
     ELASTIC_PARAMETERS,
@@ -145,7 +143,4 @@ def number_of_pieces(positions, radius: float, minimum_size: int = 1) -> int:
         raise InputError(f"number_of_pieces: radius is {radius}, must be positive")
     if len(positions) == 0:
         return 0
-    pairs = cKDTree(positions).query_pairs(radius, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), (len(positions),) * 2)
-    _, labels = connected_components(links, directed=False)
-    return int(np.sum(np.bincount(labels) >= minimum_size))
+    return int(np.sum(np.bincount(connected_parts(positions, radius)) >= minimum_size))

@@ -59,7 +59,7 @@ def _elastic(spacing: float) -> Scene:
         size=SIZE,
         centre=_at(0.5, SIZE, spacing),
         velocity=(0.0, 0.0, -1.0),
-        spin=(0.0, 1.2, 0.0),
+        spin=(0.0, 0.5, 0.0),
     )
     return _scene(thing, spacing, 0.4)
 
@@ -101,12 +101,13 @@ def _sand(spacing: float) -> Scene:
 def _fracture(spacing: float) -> Scene:
     size = 0.75
     centre = _at(0.4, size, spacing)
-    # Flaws decide where a real thing breaks: here three planes that meet off the middle.
+    # Flaws decide where a real thing breaks: here three planes that meet off the middle, one layer
+    # of particles thick. Thicker ones leave more rubble than pieces.
     flaws = []
     for axis, offset in enumerate((0.06, -0.05, 0.04)):
         place, half_size = list(centre), [size] * 3
         place[axis] += offset * size
-        half_size[axis] = 0.5 * spacing
+        half_size[axis] = 0.25 * spacing
         flaws.append(
             Region(
                 tuple(place), tuple(half_size), {"fracture_strain": 5e-3, "softening_strain": 0.02}
@@ -123,7 +124,7 @@ def _fracture(spacing: float) -> Scene:
         regions=tuple(flaws),
         size=size,
         centre=centre,
-        velocity=(0.0, 0.0, -4.0),
+        velocity=(0.0, 0.0, -3.0),
         rotation=(Rotation((1.0, 0.0, 0.0), 20.0),),
         filling=Filling(show=True),
     )

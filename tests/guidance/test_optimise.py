@@ -11,7 +11,6 @@ from jaxphys.guidance.optimise import (
     OptimiseConfig,
     draw,
     draw_views,
-    least_isolated,
     neighbour_sizes,
     optimise,
     start,
@@ -96,17 +95,3 @@ def test_empty_requests_are_refused():
         text_to_gaussians("  ")
     with pytest.raises(InputError, match="at least one"):
         text_to_gaussians("a can", count=0)
-
-
-def test_floating_points_go_and_thin_parts_stay():
-    rng = np.random.default_rng(0)
-    ball = rng.normal(size=(400, 3))
-    ball *= 0.3 / np.linalg.norm(ball, axis=1, keepdims=True)
-    rod = np.stack([np.zeros(30), np.zeros(30), np.linspace(0.33, 1.2, 30)], 1)
-    floating = np.array([[0.6, 0.0, 0.0], [0.0, -0.7, 0.1], [-0.5, 0.5, 0.0]])
-    points = np.concatenate([ball, floating, rod])
-    kept = least_isolated(points, len(points) - 3)
-    np.testing.assert_array_equal(np.setdiff1d(np.arange(len(points)), kept), [400, 401, 402])
-    np.testing.assert_array_equal(least_isolated(points, len(points)), np.arange(len(points)))
-    np.testing.assert_array_equal(least_isolated(np.zeros((1, 3)), 1), [0])
-    assert len(least_isolated(np.zeros((20, 3)), 7)) == 7
