@@ -54,11 +54,12 @@ def samples_seen(lines: list[dict], step: int) -> int:
 
 
 def pieces(lines: list[dict], step: int) -> list[dict]:
-    """First step, batch and learning rate of each piece of a run, where one of them changes."""
+    """First step and settings of each piece of a run, where one of them changes."""
     found: list[dict] = []
     for line in lines:
         if "start" in line and line["start"] < step:
-            settings = {key: line["options"][key] for key in ("batch", "learning_rate")}
+            given = line["options"]
+            settings = {k: given[k] for k in ("batch", "learning_rate", "points") if k in given}
             if not found or any(found[-1][key] != value for key, value in settings.items()):
                 found.append({"start": line["start"], **settings})
     return found

@@ -59,7 +59,7 @@ def _elastic(spacing: float) -> Scene:
         size=SIZE,
         centre=_at(0.5, SIZE, spacing),
         velocity=(0.0, 0.0, -1.0),
-        spin=(0.0, 0.5, 0.0),
+        spin=(0.0, 0.2, 0.0),
     )
     return _scene(thing, spacing, 0.4)
 
