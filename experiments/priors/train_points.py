@@ -85,8 +85,8 @@ def sheet(text: np.ndarray, seed: int, count: int = 2048):
 
 
 def main() -> None:
-    parser = arguments(__doc__, batch=32)
-    parser.add_argument("--points", type=int, default=256, help="points a sample")
+    parser = arguments(__doc__, batch=12)
+    parser.add_argument("--points", type=int, default=1024, help="points a sample")
     options = parser.parse_args()
     data = records.load(options.data)
     clouds = len(data.points)
