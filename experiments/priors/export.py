@@ -22,7 +22,7 @@ from safetensors.numpy import save_file
 from jaxphys import weights
 from jaxphys.guidance.pixel_prior import PixelPrior, PixelPriorConfig
 from jaxphys.guidance.point_prior import PointPrior, PointPriorConfig
-from jaxphys.guidance.priors import named_parameters
+from jaxphys.networks.parameters import named_parameters
 
 KINDS = {
     "point_prior": (PointPrior, PointPriorConfig, "train_points"),

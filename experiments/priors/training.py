@@ -26,7 +26,7 @@ from PIL import Image
 
 from experiments.priors.muon import muon
 from jaxphys.guidance.diffusion import add_noise, interpret
-from jaxphys.guidance.priors import named_parameters, with_parameters
+from jaxphys.networks.parameters import named_parameters, with_parameters
 
 Array = jax.Array
 Batch = dict[str, np.ndarray]

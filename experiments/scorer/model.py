@@ -16,8 +16,8 @@ from safetensors.numpy import save_file
 from jaxphys.core.errors import InputError
 from jaxphys.core.files import atomic_path
 from jaxphys.guidance.layers import Linear, normalise
-from jaxphys.guidance.priors import named_parameters, with_parameters
 from jaxphys.guidance.text_encoder import WIDTH
+from jaxphys.networks.parameters import named_parameters, with_parameters
 
 Array = jax.Array
 RESOLUTION = 64

@@ -24,8 +24,8 @@ from experiments.scorer.augment import augment
 from experiments.scorer.evaluate import held_out_report
 from experiments.scorer.model import Scorer, ScorerConfig, save
 from jaxphys.core.files import atomic_path
-from jaxphys.guidance.priors import named_parameters, with_parameters
 from jaxphys.guidance.text_encoder import load_text_encoder
+from jaxphys.networks.parameters import named_parameters, with_parameters
 
 Array = jax.Array
 DECAY = 0.98  # of the averaged weights

@@ -6,7 +6,6 @@ from dataclasses import fields
 from functools import cache
 from typing import Any, TypeVar
 
-import jax
 import jax.numpy as jnp
 from flax import nnx
 
@@ -14,30 +13,9 @@ from jaxphys import weights
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.pixel_prior import PixelPrior, PixelPriorConfig
 from jaxphys.guidance.point_prior import PointPrior, PointPriorConfig
+from jaxphys.networks.parameters import named_parameters, with_parameters
 
-Array = jax.Array
 Module = TypeVar("Module", bound=nnx.Module)
-
-
-def _name(path: tuple) -> str:
-    keys = [getattr(entry, "key", getattr(entry, "idx", None)) for entry in path]
-    return "/".join(str(key) for key in keys if key is not None)
-
-
-def named_parameters(module: nnx.Module) -> dict[str, Array]:
-    """Every parameter under a name such as `layers/0/attention/output/kernel`."""
-    leaves, _ = jax.tree_util.tree_flatten_with_path(nnx.state(module, nnx.Param))
-    return {_name(path): leaf for path, leaf in leaves}
-
-
-def with_parameters(module: Module, parameters: dict[str, Array]) -> Module:
-    """A module like `module` (whose own arrays are not read) that holds `parameters`.
-
-    Cheap and free of effects: made to be called inside a jitted function.
-    """
-    graph, state = nnx.split(module, nnx.Param)
-    leaves, structure = jax.tree_util.tree_flatten_with_path(state)
-    return nnx.merge(graph, structure.unflatten([parameters[_name(path)] for path, _ in leaves]))
 
 
 def require_priors() -> None:

@@ -7,8 +7,8 @@ import pytest
 from flax import nnx
 
 from jaxphys.guidance.pixel_prior import PixelCondition, PixelPrior, PixelPriorConfig
-from jaxphys.guidance.priors import named_parameters, with_parameters
 from jaxphys.guidance.views import view_features
+from jaxphys.networks.parameters import named_parameters, with_parameters
 
 TINY = PixelPriorConfig(
     resolution=16, patch=4, text=12, width=32, layers=2, head_width=16, hidden=48, rank=4

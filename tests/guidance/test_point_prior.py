@@ -13,7 +13,7 @@ from jaxphys.guidance.point_prior import (
     sample_points,
     to_frame,
 )
-from jaxphys.guidance.priors import named_parameters, with_parameters
+from jaxphys.networks.parameters import named_parameters, with_parameters
 
 TINY = PointPriorConfig(
     text=12,

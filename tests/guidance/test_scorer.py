@@ -20,7 +20,7 @@ from experiments.scorer.sentences import MODEL_NAMES, SENTENCES
 from experiments.scorer.train import contrastive_loss, read_captions
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
-from jaxphys.guidance.priors import named_parameters
+from jaxphys.networks.parameters import named_parameters
 
 SEED = 3000  # neither trained on nor held out
 
