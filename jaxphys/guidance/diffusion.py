@@ -122,15 +122,20 @@ def rescaled(guided_clean: Array, conditional_clean: Array, strength: float | Ar
     return guided_clean * (1.0 + strength * (ratio - 1.0))
 
 
-def karras_times(
-    schedule: Schedule, steps: int, largest: float, smallest: float, rho: float
-) -> Array:
-    """(steps + 1,) times falling to 0, spaced as EDM's eq. 5 in the ratio sigma / alpha."""
+def karras_ratios(steps: int, largest: float, smallest: float, rho: float) -> Array:
+    """(steps,) ratios sigma / alpha falling from `largest` to `smallest`, as EDM's eq. 5."""
     if steps < 1:
         raise InputError(f"sampling needs at least one step, got {steps}")
     ramp = jnp.linspace(0.0, 1.0, steps)
-    ratio = (largest ** (1 / rho) + ramp * (smallest ** (1 / rho) - largest ** (1 / rho))) ** rho
-    return jnp.concatenate([schedule.time_of_ratio(ratio), jnp.zeros(1)])
+    return (largest ** (1 / rho) + ramp * (smallest ** (1 / rho) - largest ** (1 / rho))) ** rho
+
+
+def karras_times(
+    schedule: Schedule, steps: int, largest: float, smallest: float, rho: float
+) -> Array:
+    """(steps + 1,) times falling to 0, at `karras_ratios`."""
+    ratios = karras_ratios(steps, largest, smallest, rho)
+    return jnp.concatenate([schedule.time_of_ratio(ratios), jnp.zeros(1)])
 
 
 def _as_batch(time: Array, noisy: Array) -> Array:
