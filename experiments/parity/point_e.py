@@ -14,8 +14,8 @@ from torch.nn import functional
 from experiments.parity.arrays import pseudo_random, weights
 
 CHANNELS = 6
-SCALES = torch.tensor([2.0, 2.0, 2.0, 0.007843137255, 0.007843137255, 0.007843137255])
-BIASES = torch.tensor([0.0, 0.0, 0.0, -1.0, -1.0, -1.0])
+SCALES = torch.tensor([2.0] * 3 + [0.007843137255] * 3, dtype=torch.float64)
+BIASES = torch.tensor([0.0] * 3 + [-1.0] * 3, dtype=torch.float64)
 WIDTH, LAYERS, HEADS, TEXT, GRID = 16, 2, 2, 8, (3, 6)  # of the tests' networks
 
 
@@ -128,9 +128,9 @@ def base() -> dict[str, np.ndarray]:
 def upsampler() -> dict[str, np.ndarray]:
     """With a picture and without. The coarse cloud has colours from 0 to 255."""
     network = Network(weights(upsampler_shapes(WIDTH, LAYERS, GRID[1])), torch.float32)
-    network.arrays |= {"channel_scales": SCALES, "channel_biases": BIASES}
+    network.arrays |= {"channel_scales": SCALES.float(), "channel_biases": BIASES.float()}
     noisy, step = inputs("noisy", 2, 7, CHANNELS), torch.tensor([3.0, 900.0])
-    low = (inputs("low", 2, 5, CHANNELS) - BIASES) / SCALES
+    low = ((inputs("low", 2, 5, CHANNELS) - BIASES) / SCALES).float()
     grid = inputs("grid", 2, *GRID)
     return {
         "told": network.upsampler(noisy, step, low, grid).numpy(),
@@ -206,12 +206,12 @@ def sampling() -> dict[str, np.ndarray]:
     def clouds(denoise, name, count, largest):
         sigmas = sigmas_of(10, 1e-3, largest)
         noise = inputs(name, 1, count, CHANNELS, scale=1.7, dtype=double)
-        return (heun(denoise, sigmas[0] * noise, sigmas) - BIASES) / SCALES.to(double)
+        return (heun(denoise, sigmas[0] * noise, sigmas) - BIASES) / SCALES
 
     coarse = clouds(guided, "coarse noise", 8, 0.4)
 
     finer = Network(weights(upsampler_shapes(WIDTH, LAYERS, GRID[1])), double)
-    finer.arrays |= {"channel_scales": SCALES.to(double), "channel_biases": BIASES.to(double)}
+    finer.arrays |= {"channel_scales": SCALES, "channel_biases": BIASES}
     grid = torch.zeros(1, *GRID, dtype=double)
     betas = 1000 / 1024 * np.linspace(1e-4, 0.02, 1024)
     add = discrete(
