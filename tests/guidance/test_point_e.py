@@ -262,12 +262,15 @@ SIZES = {"base_config": CONFIG, "upsampler_config": CONFIG, "config": FEW}
 def test_networks_are_read_from_their_files(tmp_path):
     save_file(arrays_of(PointEBase), tmp_path / "base.safetensors")
     save_file(arrays_of(PointEUpsampler), tmp_path / "more.safetensors")
-    prior = load_point_e(tmp_path / "base.safetensors", tmp_path / "more.safetensors", **SIZES)
-    kernel = prior.base.input_proj.kernel[...]
+    alone = load_point_e(tmp_path / "base.safetensors", **SIZES)
+    kernel = alone.base.input_proj.kernel[...]
     np.testing.assert_array_equal(kernel, arrays_of(PointEBase)["input_proj.weight"].T)
+    assert alone.upsampler is None
+    files = (tmp_path / "base.safetensors", tmp_path / "more.safetensors")
+    prior = load_point_e(*files, dtype=jnp.bfloat16, **SIZES)
+    assert prior.base.input_proj.kernel[...].dtype == jnp.bfloat16
+    assert prior.upsampler.input_proj.kernel[...].dtype == jnp.bfloat16
     np.testing.assert_allclose(prior.upsampler.channel_scales[...], SCALES, rtol=1e-6)
-    alone = load_point_e(tmp_path / "base.safetensors", dtype=jnp.bfloat16, **SIZES)
-    assert alone.upsampler is None and alone.base.input_proj.kernel[...].dtype == jnp.bfloat16
 
 
 def test_files_of_other_networks_are_refused(tmp_path):
