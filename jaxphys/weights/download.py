@@ -37,8 +37,8 @@ def unreachable(url: str) -> str | None:
     reasons: list[str | None] = []
 
     def ask() -> None:
-        request = urllib.request.Request(urljoin(url, "/"), method="HEAD", headers=AGENT)
         try:
+            request = urllib.request.Request(urljoin(url, "/"), method="HEAD", headers=AGENT)
             with urllib.request.urlopen(request, timeout=PATIENCE):
                 reasons.append(None)
         except urllib.error.HTTPError as refusal:
@@ -90,6 +90,9 @@ def from_urls(files: tuple[File, ...], folder: Path) -> None:
                 if answer.url.startswith("http:") and file.url.startswith("https:"):
                     raise InputError(f"{file.url}: leads to {answer.url}, which anyone can change")
                 _store(answer, file, folder, file.url)
+        except urllib.error.HTTPError as refusal:
+            refusal.close()
+            raise InputError(f"{file.url}: {refusal}") from refusal
         except (
             urllib.error.URLError,
             http.client.HTTPException,
