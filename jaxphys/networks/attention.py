@@ -53,10 +53,13 @@ def attend(
 
 
 def _attend(queries: Array, keys: Array, values: Array, rows: Array, causal: bool) -> Array:
-    logits = jnp.einsum("bhqd,bhkd->bhqk", queries * queries.shape[-1] ** -0.5, keys)
-    logits = logits.astype(jnp.promote_types(logits.dtype, jnp.float32))
+    # Sums in float32 or better: more exact, and faster of bfloat16 (see `layers.product`).
+    wide = jnp.promote_types(queries.dtype, jnp.float32)
+    queries = queries * queries.shape[-1] ** -0.5
+    logits = jnp.einsum("bhqd,bhkd->bhqk", queries, keys, preferred_element_type=wide)
     if causal:
         seen = rows[:, None] >= jnp.arange(keys.shape[2])
         logits = jnp.where(seen, logits, -jnp.inf)
     weights = jax.nn.softmax(logits, axis=-1).astype(values.dtype)
-    return jnp.einsum("bhqk,bhkd->bhqd", weights, values)
+    mixed = jnp.einsum("bhqk,bhkd->bhqd", weights, values, preferred_element_type=wide)
+    return mixed.astype(values.dtype)
