@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-MODELS = ("stable_diffusion", "clip", "point_e", "llama")
+MODELS = ("stable_diffusion", "sampling", "clip", "point_e", "llama")
 ROOT = Path(__file__).parents[2] / "tests" / "networks"
 TOLERANCE = 1e-5  # relative to the largest entry: between versions and machines
 

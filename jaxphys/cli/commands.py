@@ -3,7 +3,7 @@ quick.
 """
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -23,6 +23,12 @@ def generate(
     frames: int | None = None,
     steps: int | None = None,
     splats: int | None = None,
+    prior: str | None = None,
+    shape_prior: str | None = None,
+    negative: str | None = None,
+    refiner: Literal["auto", "endpoint", "local", "rules"] | None = None,
+    precision: Literal["bfloat16", "float32"] | None = None,
+    attention_slice: int | None = None,
     save_splats: bool = False,
 ) -> int:
     """Make an object from a sentence and move it.
@@ -38,6 +44,15 @@ def generate(
         frames: Number of pictures. Default: 48.
         steps: Steps of optimisation.
         splats: Number of Gaussians at most.
+        prior: Judges pictures: bundled, stable-diffusion, stable-diffusion-2.1-base,
+            stable-diffusion-2.1, or a folder in diffusers' layout. Default: bundled.
+        shape_prior: Judges points: bundled, point-e, or a folder with its files. Default: bundled.
+        negative: What Stable Diffusion moves away from.
+        refiner: Who refines the sentence. Default: auto, an endpoint if one is set up, else a
+            local language model if there is one, else fixed rules.
+        precision: Of a published prior. Default: bfloat16.
+        attention_slice: Queries a published prior attends from at a time; fewer take less memory.
+            Default: 1024.
         save_splats: Also write one .ply for each picture.
     """
     from jaxphys.cli.scenes import scene_for
@@ -45,7 +60,72 @@ def generate(
 
     changes = {"seed": seed, "width": width, "height": height, "frames": frames}
     scene = scene_for(config, material, changes)
-    run(prompt, scene, out, steps=steps, splats=splats, save_splats=save_splats, progress=True)
+    run(
+        prompt,
+        scene,
+        out,
+        save_splats=save_splats,
+        progress=True,
+        steps=steps,
+        splats=splats,
+        prior=prior,
+        shape_prior=shape_prior,
+        negative=negative,
+        refiner=refiner,
+        precision=precision,
+        attention_slice=attention_slice,
+    )
+    return 0
+
+
+def image(
+    prompt: Positional[str],
+    /,
+    *,
+    out: Path,
+    prior: str = "stable-diffusion",
+    negative: str = "",
+    seed: int = 0,
+    steps: int = 50,
+    guidance: float = 7.5,
+    sampler: Literal["ddim", "ddpm"] = "ddim",
+    width: int | None = None,
+    height: int | None = None,
+    precision: Literal["bfloat16", "float32"] = "bfloat16",
+    attention_slice: int = 1024,
+) -> int:
+    """Paint one picture with Stable Diffusion, which shows that a checkpoint is whole.
+
+    Args:
+        prompt: What to paint.
+        out: The .png file to write.
+        prior: As for generate.
+        negative: What to move away from.
+        seed: Of the noise.
+        steps: Of the sampler.
+        guidance: Towards the prompt; 1 is none.
+        sampler: Deterministic (ddim) or with fresh noise at each step (ddpm).
+        width: Pixels. Default: what the network was trained on.
+        height: Pixels, likewise.
+        precision: Of weights and computation.
+        attention_slice: Queries attended from at a time; fewer take less memory.
+    """
+    from jaxphys.pipeline.paint import paint_file
+
+    paint_file(
+        prompt,
+        out,
+        prior=prior,
+        negative=negative,
+        seed=seed,
+        steps=steps,
+        guidance=guidance,
+        sampler=sampler,
+        width=width,
+        height=height,
+        dtype=precision,
+        attention_slice=attention_slice,
+    )
     return 0
 
 

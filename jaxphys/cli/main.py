@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import tyro
 
 from jaxphys.cli import commands
+from jaxphys.cli.evaluate import evaluate
 from jaxphys.core.errors import InputError
 
 INTERRUPTED = 130
@@ -21,11 +22,13 @@ def run(arguments: Sequence[str] | None = None) -> int:
         status = tyro.extras.subcommand_cli_from_dict(
             {
                 "generate": commands.generate,
+                "image": commands.image,
                 "animate": commands.animate,
                 "splat": commands.splat,
                 "render": commands.render,
                 "plan": commands.plan,
                 "materials": commands.materials,
+                "evaluate": evaluate,
                 "doctor": commands.doctor,
             },
             prog="jaxphys",

@@ -57,9 +57,15 @@ class DiscreteSchedule:
         return jnp.clip(step, 0, self.count - 1).astype(jnp.int32)
 
     def alpha_sigma(self, time: Array) -> tuple[Array, Array]:
-        """Signal and noise scale at the step nearest to `time`; same shape as `time`."""
+        """Signal and noise scale at the step nearest to `time`; same shape as `time`.
+
+        One step before the first, at -1 / (count - 1), and below, samples are clean: (1, 0). Some
+        samplers end there.
+        """
         kept = self.alphas_cumulative()
-        return self._read(np.sqrt(kept), time), self._read(np.sqrt(1.0 - kept), time)
+        alpha, sigma = self._read(np.sqrt(kept), time), self._read(np.sqrt(1.0 - kept), time)
+        clean = jnp.asarray(time) * (self.count - 1) < -0.5
+        return jnp.where(clean, 1, alpha), jnp.where(clean, 0, sigma)
 
     def log_snr(self, time: Array) -> Array:
         """log(alpha^2 / sigma^2) at the step nearest to `time`: falls, finite at both ends."""

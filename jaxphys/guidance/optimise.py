@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -26,16 +26,9 @@ from jaxphys.gaussians.gaussians import Gaussians, from_points, select
 from jaxphys.gaussians.harmonics import dc_to_rgb
 from jaxphys.guidance import views
 from jaxphys.guidance.clouds import even_subset
-from jaxphys.guidance.distillation import (
-    DistillationConfig,
-    image_distillation,
-    point_distillation,
-)
+from jaxphys.guidance.distillation import DistillationConfig
+from jaxphys.guidance.guides import Guides, bundled_image_guide, bundled_shape_guide
 from jaxphys.guidance.pictures import draw, neighbour_sizes, room_for_pairs
-from jaxphys.guidance.pixel_prior import PixelPrior
-from jaxphys.guidance.point_prior import PointPrior, SamplingConfig, sample_points
-from jaxphys.guidance.priors import load_pixel_prior, load_point_prior
-from jaxphys.guidance.text_encoder import load_text_encoder
 from jaxphys.render import next_capacity
 
 Array = jax.Array
@@ -46,13 +39,14 @@ class OptimiseConfig:
     """Choices of `text_to_gaussians`; lengths in object lengths.
 
     Attributes:
-        count: Gaussians drawn from the point prior.
+        count: Gaussians drawn from the 3D prior.
         oversampling: so many times `count` are drawn, for `clouds.even_subset` to choose from.
         room: capacity for density control, as a multiple of `count`.
         steps: of distillation; 0 leaves the sampled cloud as it is.
         views: pictures a step.
-        sampling, image, point: of the cloud and the two distillations.
-        image_weight, point_weight, regular_weight: of the losses.
+        image, shape: of the two distillations.
+        image_weight, shape_weight, regular_weight: of the losses.
+        shape_until: progress in [0, 1] at which the 3D prior has said what it can.
         rates: learning rate by field of `Gaussians`, at the start; falls to a tenth.
         size, opacity: Gaussians start with `size` times the distance to their nearest neighbours.
         largest: standard deviations above are pulled back.
@@ -64,16 +58,16 @@ class OptimiseConfig:
     room: float = 1.25
     steps: int = 160
     views: int = 4
-    sampling: SamplingConfig = SamplingConfig()
     image: DistillationConfig = DistillationConfig(
         guidance=25.0, rescale=0.0, weight="clean", time=(0.02, 0.25, 0.1)
     )
-    point: DistillationConfig = DistillationConfig(
+    shape: DistillationConfig = DistillationConfig(
         guidance=3.0, rescale=0.7, weight="clean", time=(0.02, 0.12, 0.05)
     )
     image_weight: float = 1.0
-    point_weight: float = 0.5
+    shape_weight: float = 0.5
     regular_weight: float = 1.0
+    shape_until: float = 1.0
     rates: tuple[tuple[str, float], ...] = (
         ("means", 4e-4),
         ("log_scales", 6e-3),
@@ -102,21 +96,10 @@ class OptimiseState(NamedTuple):
     step: Array
 
 
-class Guides(NamedTuple):
-    """The priors and what they are told: text (D,)."""
-
-    pixel: PixelPrior
-    point: PointPrior
-    text: Array
-
-
 def initial_gaussians(guides: Guides, key: Array, config: OptimiseConfig) -> Gaussians:
-    """Gaussians at evenly spread points of a cloud drawn from the point prior."""
-    drawn = math.ceil(config.count * config.oversampling)
-    points, colours = sample_points(
-        guides.point, guides.text[None], key, count=drawn, config=config.sampling
-    )
-    points, colours = np.asarray(points[0]), np.asarray(colours[0])
+    """Gaussians at evenly spread points of a cloud drawn from the 3D prior."""
+    drawn = guides.shape.sample(key, math.ceil(config.count * config.oversampling))
+    points, colours = (np.asarray(array) for array in drawn)
     kept = even_subset(points, config.count)
     points, colours = points[kept], colours[kept]
     sizes = neighbour_sizes(points, config.size, config.largest)
@@ -167,35 +150,35 @@ def advance(
 ) -> tuple[OptimiseState, Array]:
     """One step of distillation. Returns the next state and whether a picture overflowed."""
     key = jax.random.fold_in(key, state.step)
-    view_key, ground_key, image_key, point_key = jax.random.split(key, 4)
+    view_key, ground_key, image_key, shape_key = jax.random.split(key, 4)
     dtype = state.gaussians.means.dtype
     azimuth, elevation = draw_views(view_key, config.views, dtype)
     ground = jax.random.uniform(ground_key, (config.views, 3), dtype)
-    told = views.view_features(azimuth, elevation, xp=jnp)
-    text = jnp.broadcast_to(guides.text, (config.views, *guides.text.shape))
     progress = state.step.astype(dtype) / max(config.steps, 1)
 
     def loss(gaussians: Gaussians) -> tuple[Array, Array]:
         def picture(view):
-            image = draw(gaussians, *view, capacity)
+            image = draw(gaussians, *view, capacity, guides.image.resolution)
             return image.colour, image.overflow
 
         images, overflow = jax.lax.map(picture, (azimuth, elevation, ground))
-        image = image_distillation(
-            guides.pixel, images, text, told, image_key, config.image, progress
-        )
-        # Only what is alive at the start is judged in 3D; what density control adds lies close by.
-        point = point_distillation(
-            guides.point,
-            gaussians.means[: config.count],
-            dc_to_rgb(gaussians.harmonics[: config.count, 0]),
-            guides.text,
-            point_key,
-            config.point,
-            progress,
-        )
-        value = config.image_weight * image.value / images[0].size
-        value = value + config.point_weight * point.value / (6 * config.count)
+        image = guides.image.distil(images, azimuth, elevation, image_key, config.image, progress)
+        value = config.image_weight * image.value / image.clean[0].size
+
+        def judged(gaussians: Gaussians) -> Array:
+            # What is alive at the start is judged in 3D; what density control adds lies close by.
+            means = gaussians.means[: config.count]
+            colours = dc_to_rgb(gaussians.harmonics[: config.count, 0])
+            shape = guides.shape.distil(means, colours, shape_key, config.shape, progress)
+            return shape.value / (6 * config.count)
+
+        if config.shape_until < 1:
+            wanted = progress < config.shape_until
+            nothing = jnp.zeros_like(value)
+            shape_value = jax.lax.cond(wanted, judged, lambda _: nothing, gaussians)
+        else:
+            shape_value = judged(gaussians)
+        value = value + config.shape_weight * shape_value
         value = value + config.regular_weight * regularity(gaussians, state.alive, config)
         return value, overflow.any()
 
@@ -236,7 +219,7 @@ def optimise(
     on_step: Callable[[OptimiseState], None] | None = None,
 ) -> OptimiseState:
     """Steps from `state` to the end; `on_step` sees every new state, to save or show it."""
-    capacity = room_for_pairs(state.gaussians)
+    capacity = room_for_pairs(state.gaussians, guides.image.resolution)
     bar = tqdm(
         total=config.steps,
         initial=int(state.step),
@@ -264,10 +247,9 @@ def text_to_gaussians(
     prompt: str,
     *,
     seed: int = 0,
-    steps: int | None = None,
-    count: int | None = None,
     progress: bool = False,
     config: OptimiseConfig = OptimiseConfig(),
+    guides: Guides | None = None,
     resume: OptimiseState | None = None,
     on_step: Callable[[OptimiseState], None] | None = None,
 ) -> Gaussians:
@@ -276,8 +258,9 @@ def text_to_gaussians(
     Args:
         prompt: refined text, see `refine`; its first comma-separated part names the object.
         seed: the same seed gives the same Gaussians on the same device.
-        steps, count: override `config`.
         progress: show a bar.
+        config: see `OptimiseConfig`.
+        guides: the priors, told the prompt; by default the bundled ones.
         resume: a state that `on_step` was given: go on from there.
         on_step: called with the state after each step.
 
@@ -286,13 +269,10 @@ def text_to_gaussians(
     """
     if not prompt.strip():
         raise InputError("prompt is empty: say what to make, for example 'a strawberry'")
-    changes = {"steps": steps, "count": count}
-    config = replace(config, **{k: v for k, v in changes.items() if v is not None})
     if config.count < 1:
         raise InputError(f"count = {config.count}: needs at least one Gaussian")
-    encoder = load_text_encoder()
-    text = jnp.asarray(encoder([prompt.split(",")[0].strip()])[0], jnp.float32)
-    guides = Guides(load_pixel_prior()[0], load_point_prior()[0], text)
+    if guides is None:
+        guides = Guides(bundled_image_guide(prompt), bundled_shape_guide(prompt))
     cloud_key, step_key = jax.random.split(jax.random.key(seed))
     state = resume
     if state is None:

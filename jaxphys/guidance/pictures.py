@@ -1,4 +1,4 @@
-"""The small pictures that the pixel prior is trained on and judges: one way to draw both."""
+"""The pictures that image priors judge, and that the bundled one is trained on: one way to draw."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from jaxphys.render import (
 )
 
 Array = jax.Array
-SETTINGS = Settings(tile_size=8)
 
 
 def neighbour_sizes(points: np.ndarray, scale: float, largest: float) -> np.ndarray:
@@ -32,15 +31,22 @@ def neighbour_sizes(points: np.ndarray, scale: float, largest: float) -> np.ndar
     return np.clip(scale * mean, 1e-3, largest).astype(np.float32)
 
 
-def view_camera(azimuth: Array | float, elevation: Array | float, dtype=jnp.float32) -> Camera:
-    """The camera of a view [rad], see `views`."""
+def settings(resolution: int) -> Settings:
+    """Small tiles for small pictures."""
+    return Settings(tile_size=8 if resolution <= 128 else 16)
+
+
+def view_camera(
+    azimuth: Array | float, elevation: Array | float, resolution: int, dtype=jnp.float32
+) -> Camera:
+    """The camera of a view [rad], see `views`; `resolution` pixels a side."""
     eye = views.camera_position(jnp.asarray(azimuth, dtype), jnp.asarray(elevation, dtype), xp=jnp)
     return look_at(
         eye,
         jnp.zeros_like(eye),
         field_of_view=views.FIELD_OF_VIEW,
-        width=views.RESOLUTION,
-        height=views.RESOLUTION,
+        width=resolution,
+        height=resolution,
     )
 
 
@@ -50,19 +56,22 @@ def draw(
     elevation: Array | float,
     background: Array | float,
     capacity: int | None = None,
+    resolution: int = views.RESOLUTION,
 ) -> Image:
-    """The picture (64, 64) of a view; `background` and `capacity` as for `render`."""
-    camera = view_camera(azimuth, elevation, gaussians.means.dtype)
+    """The square picture of a view; `background` and `capacity` as for `render`."""
+    camera = view_camera(azimuth, elevation, resolution, gaussians.means.dtype)
     eye = views.camera_position(azimuth, elevation, xp=jnp).astype(gaussians.means.dtype)
     splats = to_splats(gaussians, eye)
-    return render(splats, camera, background=background, settings=SETTINGS, capacity=capacity)
+    return render(
+        splats, camera, background=background, settings=settings(resolution), capacity=capacity
+    )
 
 
-def room_for_pairs(gaussians: Gaussians) -> int:
+def room_for_pairs(gaussians: Gaussians, resolution: int) -> int:
     """Capacity for `draw`: twice what the neediest of a few views asks for."""
     needs = []
     for azimuth, elevation in ((0.0, 0.0), (1.6, 0.3), (0.8, 0.9)):
         eye = jnp.asarray(views.camera_position(azimuth, elevation), gaussians.means.dtype)
-        camera = view_camera(azimuth, elevation, gaussians.means.dtype)
-        needs.append(int(required_pairs(to_splats(gaussians, eye), camera, SETTINGS)))
+        camera = view_camera(azimuth, elevation, resolution, gaussians.means.dtype)
+        needs.append(int(required_pairs(to_splats(gaussians, eye), camera, settings(resolution))))
     return next_capacity(2 * max(needs))

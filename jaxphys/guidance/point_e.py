@@ -30,8 +30,7 @@ from jaxphys.weights.safetensors_files import open_arrays
 from jaxphys.weights.torch_zip import read_torch_zip
 
 Array = jax.Array
-BASE = PointEConfig()
-UPSAMPLER = PointEConfig(slice_size=1089)  # four slices of 4,353 tokens
+SLICE = 1089  # queries of the upsampler at a time: four slices of 4,353 tokens
 BASE_SCHEDULE = DiscreteSchedule("cosine", 1024)
 UPSAMPLER_SCHEDULE = DiscreteSchedule("linear", 1024, 1000 / 1024 * 1e-4, 1000 / 1024 * 0.02)
 SCALES = np.array([2.0, 2.0, 2.0, 2 / 255, 2 / 255, 2 / 255])
@@ -96,8 +95,8 @@ def load_point_e(
     upsampler_file: str | Path | None = None,
     *,
     dtype: jnp.dtype | str = jnp.float32,
-    base_config: PointEConfig = BASE,
-    upsampler_config: PointEConfig = UPSAMPLER,
+    base_config: PointEConfig | None = None,
+    upsampler_config: PointEConfig | None = None,
     config: PointEPriorConfig = PointEPriorConfig(),
 ) -> PointE:
     """The published networks "base40M-textvec" and "upsample", from `.pt` or `.safetensors`.
@@ -105,18 +104,21 @@ def load_point_e(
     Args:
         base_file, upsampler_file: without the second, clouds have 1,024 points at most.
         dtype: of the weights and the computation.
-        base_config, upsampler_config: of the networks; the defaults are the published sizes.
+        base_config, upsampler_config: of the networks; by default what the arrays' shapes say.
 
     Raises:
         InputError: a file is missing, damaged, or of another network.
     """
     source = str(base_file)
-    base = fill(lambda: PointEBase(base_config), _arrays(source), source=source, dtype=dtype)
+    arrays = _arrays(source)
+    sizes = base_config or PointEConfig.of_arrays(arrays, source)
+    base = fill(lambda: PointEBase(sizes), arrays, source=source, dtype=dtype)
     if upsampler_file is None:
         return PointE(base, None, config)
     source = str(upsampler_file)
     arrays = _arrays(source)
-    upsampler = fill(lambda: PointEUpsampler(upsampler_config), arrays, source=source, dtype=dtype)
+    wide = upsampler_config or PointEConfig.of_arrays(arrays, source, SLICE)
+    upsampler = fill(lambda: PointEUpsampler(wide), arrays, source=source, dtype=dtype)
     for name, wanted in (("channel_scales", SCALES), ("channel_biases", BIASES)):
         if not np.allclose(arrays[name], wanted, rtol=1e-2, atol=0):
             raise InputError(

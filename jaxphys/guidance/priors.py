@@ -18,13 +18,12 @@ from jaxphys.networks.parameters import named_parameters, with_parameters
 Module = TypeVar("Module", bound=nnx.Module)
 
 
-def require_priors() -> None:
+def require_prior(name: str) -> None:
     """Raises `InputError` where the weights of a prior are not bundled, before any work is done."""
-    missing = {"point_prior", "pixel_prior"} - set(weights.manifest())
-    if missing:
+    if name not in weights.manifest():
         raise InputError(
-            f"generate: this version comes without the weights {', '.join(sorted(missing))}; train "
-            "them (experiments/priors/README.md), or move an object you have with `jaxphys animate`"
+            f"generate: this version comes without the weights {name}; train them "
+            "(experiments/priors/README.md), or move an object you have with `jaxphys animate`"
         )
 
 

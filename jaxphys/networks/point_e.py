@@ -7,17 +7,24 @@ a sequence, so there is no position embedding: the result is equivariant to thei
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Self
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import nnx
+
+from jaxphys.core.errors import InputError
 
 from .attention import attend, join_heads, split_heads
 from .layers import LayerNorm, Linear, gelu
 
 Array = jax.Array
 CHANNELS = 6
+HEAD = 64
 LONGEST_PERIOD = 10_000.0
 
 
@@ -38,6 +45,31 @@ class PointEConfig:
     text: int = 768
     grid: tuple[int, int] = (256, 1024)
     slice_size: int | None = None
+
+    @classmethod
+    def of_arrays(
+        cls, arrays: Mapping[str, np.ndarray], source: str, slice_size: int | None = None
+    ) -> Self:
+        """The sizes of a checkpoint, whose heads are 64 wide as in every published one.
+
+        Raises InputError, naming `source`, if it is of another kind of network.
+        """
+        block = re.compile(r"backbone\.resblocks\.(\d+)\.")
+        layers = {match[1] for match in map(block.match, arrays) if match}
+        try:
+            width = arrays["ln_pre.weight"].shape[0]
+            # The base is told a text; the upsampler tokens of a picture, after a norm of its own.
+            told = "clip_embed.weight" if "clip_embed.weight" in arrays else "clip_embed.1.weight"
+            depth = arrays[told].shape[1]
+        except (KeyError, IndexError):
+            raise InputError(
+                f"{source}: is no checkpoint of Point-E's; get the file again"
+            ) from None
+        heads = max(1, width // HEAD)
+        if told == "clip_embed.weight":
+            return cls(width, len(layers), heads, text=depth, slice_size=slice_size)
+        grid = (cls.grid[0], depth)
+        return cls(width, len(layers), heads, grid=grid, slice_size=slice_size)
 
 
 class Attention(nnx.Module):

@@ -195,13 +195,26 @@ class Generation(_Checked):
 
     Attributes:
         prompt: the sentence.
-        steps: of optimisation; null: the default of `generate`.
-        splats: number of Gaussians at most; null: the default of `generate`.
+        steps: of optimisation; null: the default of the prior.
+        splats: number of Gaussians at most; null: the default of the prior.
+        prior: the 2D prior: "bundled", a name of `jaxphys weights list` such as
+            "stable-diffusion", or a folder in diffusers' layout.
+        shape_prior: the 3D prior: "bundled", "point-e", or a folder with Point-E's files.
+        negative: what the 2D prior moves away from; bundled priors do not read it.
+        refiner: who refines the sentence; "auto" asks an endpoint, then a local model, then rules.
+        precision: of a published prior's weights and computation.
+        attention_slice: queries that a published prior attends from at a time; null: all.
     """
 
     prompt: str
     steps: int | None = field(default=None, metadata=NON_NEGATIVE)
     splats: int | None = field(default=None, metadata=POSITIVE)
+    prior: str = "bundled"
+    shape_prior: str = "bundled"
+    negative: str = ""
+    refiner: Literal["auto", "endpoint", "local", "rules"] = "auto"
+    precision: Literal["bfloat16", "float32"] = "bfloat16"
+    attention_slice: int | None = field(default=1024, metadata=POSITIVE)
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from flax import nnx
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
+from jaxphys.guidance.guides import Guides, PixelGuide, PointGuide
 from jaxphys.guidance.optimise import (
-    Guides,
     OptimiseConfig,
     draw,
     draw_views,
@@ -41,7 +41,10 @@ def guides():
         rank=4,
     )
     text = jnp.ones(12, jnp.float32) / 12**0.5
-    return Guides(PixelPrior(pixel, rngs=nnx.Rngs(0)), PointPrior(point, rngs=nnx.Rngs(0)), text)
+    return Guides(
+        PixelGuide(PixelPrior(pixel, rngs=nnx.Rngs(0)), text),
+        PointGuide(PointPrior(point, rngs=nnx.Rngs(0)), text),
+    )
 
 
 def cloud():
@@ -94,4 +97,4 @@ def test_empty_requests_are_refused():
     with pytest.raises(InputError, match="empty"):
         text_to_gaussians("  ")
     with pytest.raises(InputError, match="at least one"):
-        text_to_gaussians("a can", count=0)
+        text_to_gaussians("a can", config=OptimiseConfig(count=0))

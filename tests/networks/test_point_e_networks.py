@@ -146,3 +146,12 @@ def test_networks_are_pytrees_of_their_arrays():
     network = base()
     doubled = with_parameters(network, jax.tree.map(lambda x: 2 * x, named_parameters(network)))
     assert error(run_base(doubled), run_base(network)) > 0.1
+
+
+@pytest.mark.parametrize("name", ["base", "upsampler"])
+def test_sizes_are_read_off_the_published_arrays(name):
+    expected = json.loads((HERE / "manifests" / f"point_e_{name}.json").read_text())
+    arrays = {key: np.broadcast_to(np.float32(0), shape) for key, shape in expected.items()}
+    assert PointEConfig.of_arrays(arrays, "file") == PointEConfig()
+    with pytest.raises(InputError, match=r"^file: is no checkpoint of Point-E's"):
+        PointEConfig.of_arrays({"weight": np.zeros((2, 2))}, "file")

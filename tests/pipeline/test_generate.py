@@ -4,6 +4,7 @@ import json
 import numpy as np
 import pytest
 
+import jaxphys.guidance.choice as choice
 import jaxphys.guidance.optimise as optimise
 import jaxphys.guidance.priors as priors
 from jaxphys.core.errors import InputError
@@ -29,12 +30,13 @@ def calls(monkeypatch):
     asked = []
 
     def made(prompt, **options):
-        asked.append((prompt, options["seed"], options["steps"], options["count"]))
+        config = options["config"]
+        asked.append((prompt, options["seed"], config.steps, config.count))
         points = np.random.default_rng(options["seed"]).normal(size=(40, 3))
         return from_points(points.astype(np.float32), np.full(3, 0.5), 0.3)
 
     monkeypatch.setattr(optimise, "text_to_gaussians", made)
-    monkeypatch.setattr(priors, "require_priors", lambda: None)
+    monkeypatch.setattr(choice, "guides", lambda prompt, **options: None)
     monkeypatch.delenv("JAXPHYS_LLM_URL", raising=False)
     return asked
 

@@ -1,0 +1,153 @@
+"""From the names of priors to guides told a prompt, and to the settings that suit them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from jaxphys.core.errors import InputError, nearest
+from jaxphys.guidance import point_e_guide, stable_diffusion
+from jaxphys.guidance.distillation import DistillationConfig
+from jaxphys.guidance.guides import (
+    Guides,
+    ImageGuide,
+    ShapeGuide,
+    bundled_image_guide,
+    bundled_shape_guide,
+)
+from jaxphys.guidance.optimise import OptimiseConfig
+from jaxphys.guidance.priors import require_prior
+from jaxphys.weights.catalogue import CATALOGUE
+from jaxphys.weights.resolve import locate
+
+BUNDLED = "bundled"
+POINT_E = "point-e"
+STABLE_DIFFUSION = ("stable-diffusion-1.5", "stable-diffusion-2.1-base", "stable-diffusion-2.1")
+
+# What GSGEN's released configuration does, in lengths of the object and weights relative to the
+# image loss: guidance 100, noise levels from 0.98 down, the 3D prior for the first part only.
+LATENT = OptimiseConfig(
+    count=4096,
+    steps=5000,
+    room=2.0,
+    image=DistillationConfig(
+        guidance=100.0, rescale=0.0, weight="sigma_squared", time=(0.02, 0.98, 0.5), limit=None
+    ),
+    shape_until=0.15,
+    rates=(
+        ("means", 3e-3),
+        ("log_scales", 3e-3),
+        ("quaternions", 3e-3),
+        ("opacity_logits", 3e-3),
+        ("harmonics", 1e-2),
+    ),
+    density_every=500,
+)
+POINT_E_DISTILLATION = DistillationConfig(
+    guidance=100.0, rescale=0.0, weight="sigma_squared", time=(0.02, 0.98, 0.98)
+)
+POINT_E_WEIGHT = 0.04
+
+
+def settings(prior: str, shape_prior: str) -> OptimiseConfig:
+    """How to optimise with a 2D and a 3D prior, given by name or folder."""
+    config = OptimiseConfig() if prior == BUNDLED else LATENT
+    if shape_prior != BUNDLED:
+        config = replace(
+            config,
+            count=4096,  # as many as it draws, evenly spread: none are left out
+            oversampling=1.0,
+            shape=POINT_E_DISTILLATION,
+            shape_weight=POINT_E_WEIGHT,
+        )
+    return config
+
+
+def published_folder(given: str, names: Sequence[str], option: str, parts: Sequence[str]) -> Path:
+    """Where the files of a published prior are, fetched if they are nowhere yet.
+
+    Args:
+        given: one of `names`, an alias of one, or a folder.
+        option: what `given` answers, for errors.
+        parts: files and folders that are needed.
+
+    Raises:
+        InputError: no such name or folder, or files that are missing and cannot be had.
+    """
+    known = {alias: name for name in names for alias in (name, *CATALOGUE[name].aliases)}
+    if given in known:
+        return locate(known[given], parts=parts or None)
+    if not Path(given).is_dir():
+        valid = nearest(given, [BUNDLED, *known])
+        raise InputError(f"{option} {given}: is no folder and no name of a prior; {valid}")
+    lacking = [part for part in parts if not (Path(given) / part).exists()]
+    if lacking:
+        raise InputError(
+            f"{option} {given}: lacks {', '.join(lacking)}; copy the whole model there"
+        )
+    return Path(given)
+
+
+def require(prior: str, shape_prior: str) -> None:
+    """Raises `InputError` if the weights of the named priors are not at hand and cannot be had,
+    before any work is done."""
+    if prior == BUNDLED:
+        require_prior("pixel_prior")
+    else:
+        image_folder(prior)
+    if shape_prior == BUNDLED:
+        require_prior("point_prior")
+    else:
+        shape_folders(shape_prior)
+
+
+def image_folder(prior: str) -> Path:
+    """The folder of a Stable Diffusion, see `published_folder`."""
+    return published_folder(prior, STABLE_DIFFUSION, "prior", stable_diffusion.PARTS)
+
+
+def image_guide(
+    prior: str, prompt: str, *, negative: str, dtype: str, attention_slice: int | None
+) -> ImageGuide:
+    """The 2D prior of a name or folder, told a refined prompt. Raises InputError as `require`."""
+    if prior == BUNDLED:
+        return bundled_image_guide(prompt)
+    return stable_diffusion.stable_diffusion_guide(
+        prompt,
+        image_folder(prior),
+        negative=negative,
+        dtype=dtype,
+        attention_slice=attention_slice,
+    )
+
+
+def shape_folders(shape_prior: str) -> tuple[Path, Path]:
+    """The folders of Point-E and of the CLIP that reads for it, see `published_folder`."""
+    folder = published_folder(shape_prior, (POINT_E,), "shape_prior", ())
+    point_e_guide.files(folder)
+    return folder, locate(point_e_guide.CLIP)
+
+
+def shape_guide(shape_prior: str, prompt: str, *, dtype: str) -> ShapeGuide:
+    """The 3D prior of a name or folder, told a refined prompt. Raises InputError as `require`."""
+    if shape_prior == BUNDLED:
+        return bundled_shape_guide(prompt)
+    folder, clip = shape_folders(shape_prior)
+    return point_e_guide.point_e_guide(prompt, folder, clip, dtype=dtype)
+
+
+def guides(
+    prompt: str,
+    *,
+    prior: str = BUNDLED,
+    shape_prior: str = BUNDLED,
+    negative: str = "",
+    dtype: str = "bfloat16",
+    attention_slice: int | None = None,
+) -> Guides:
+    """Both guides, see `image_guide` and `shape_guide`."""
+    options = {"negative": negative, "dtype": dtype, "attention_slice": attention_slice}
+    return Guides(
+        image_guide(prior, prompt, **options), shape_guide(shape_prior, prompt, dtype=dtype)
+    )

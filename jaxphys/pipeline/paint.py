@@ -1,0 +1,25 @@
+"""A picture from a sentence, as a file."""
+
+from pathlib import Path
+from typing import Any
+
+from jaxphys.core.errors import InputError
+from jaxphys.pipeline.video import write_picture
+
+
+def paint_file(
+    prompt: str, out: Path, *, prior: str, negative: str, seed: int, **settings: Any
+) -> None:
+    """Writes `prompt` painted by a Stable Diffusion, given by name or folder, as the .png `out`.
+
+    `settings` are those of `PaintConfig`. Raises InputError for a bad setting, another extension,
+    or weights that cannot be had, before anything is computed.
+    """
+    from jaxphys.guidance.choice import image_folder
+    from jaxphys.guidance.text_to_image import PaintConfig, paint
+
+    if out.suffix.lower() != ".png":
+        raise InputError(f"--out {out}: must end in .png")
+    config = PaintConfig(**settings)
+    folder = image_folder(prior)
+    write_picture(out, paint(prompt, folder, negative=negative, seed=seed, config=config))
