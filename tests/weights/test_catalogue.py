@@ -6,6 +6,7 @@ from pathlib import PurePosixPath
 import pytest
 
 from jaxphys.core.errors import InputError
+from jaxphys.evaluate.aesthetic import HEADS
 from jaxphys.weights import manifest
 from jaxphys.weights.catalogue import CATALOGUE, find_entry
 
@@ -56,3 +57,14 @@ def test_deleted_repositories_come_last():
         living, deleted = CATALOGUE[name].repositories
         assert living.split("/")[0] in ("stable-diffusion-v1-5", "sd2-community")
         assert deleted.split("/")[0] in ("runwayml", "stabilityai")
+
+
+def test_the_aesthetic_heads_are_those_that_are_scored_with():
+    for entry, path, _ in HEADS.values():
+        assert [file.path for file in CATALOGUE[entry].files] == [path]
+
+
+def test_stable_diffusion_has_every_part():
+    for name in ("stable-diffusion-1.5", "stable-diffusion-2.1-base", "stable-diffusion-2.1"):
+        parts = {file.path.split("/")[0] for file in CATALOGUE[name].files}
+        assert parts == {"scheduler", "text_encoder", "tokenizer", "unet", "vae"}

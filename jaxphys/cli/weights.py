@@ -1,0 +1,79 @@
+"""The commands about weights: which there are, where, how to get them, whether they are right."""
+
+from typing import Annotated
+
+import tyro
+
+Positional = tyro.conf.Positional
+Name = Annotated[Positional[str], tyro.conf.arg(metavar="NAME")]
+
+
+def list_all(*, json: bool = False) -> int:
+    """List the networks that can be used, their licences, and which are on this computer.
+
+    Args:
+        json: Print JSON.
+    """
+    from jaxphys.cli.weights_listing import as_json, as_text, listing
+
+    print(as_json(listing()) if json else as_text(listing()))
+    return 0
+
+
+def path(name: Name, /) -> int:
+    """Print where the files of a network are; fetches nothing.
+
+    Args:
+        name: As in the list.
+    """
+    from jaxphys.weights import manifest, weights_path
+    from jaxphys.weights.resolve import locate
+
+    print(weights_path(name) if name in manifest() else locate(name, fetch=False))
+    return 0
+
+
+def fetch(name: Name, /) -> int:
+    """Fetch what is missing of a network over the network, and print where it is.
+
+    Args:
+        name: As in the list.
+    """
+    from jaxphys.weights import manifest, weights_path
+    from jaxphys.weights.resolve import fetch as run
+
+    print(weights_path(name) if name in manifest() else run(name))
+    return 0
+
+
+def verify(name: Name, /) -> int:
+    """Compare the files of a network with what is known of the published ones; status 1 if one is
+    missing or wrong.
+
+    Args:
+        name: As in the list.
+    """
+    from jaxphys.cli.weights_listing import verdicts_text
+    from jaxphys.weights import load, manifest
+    from jaxphys.weights.verify import verify as run
+
+    if name in manifest():
+        load(name)
+        print(f"{name}: comes with this package, its SHA-256 matches")
+        return 0
+    folder, verdicts = run(name)
+    print(verdicts_text(folder, verdicts))
+    return 1 if any(verdict.problem for verdict in verdicts) else 0
+
+
+Action = (
+    Annotated[list_all, tyro.conf.subcommand("list")]
+    | Annotated[path, tyro.conf.subcommand("path")]
+    | Annotated[fetch, tyro.conf.subcommand("fetch")]
+    | Annotated[verify, tyro.conf.subcommand("verify")]
+)
+
+
+def weights(action: Annotated[Action, tyro.conf.arg(name="")]) -> int:
+    """List, find, fetch and verify the weights of published networks."""
+    return action
