@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import tyro
 
-from jaxphys.cli import commands
+from jaxphys.cli import commands, weights
 from jaxphys.cli.evaluate import evaluate
 from jaxphys.core.errors import InputError
 
@@ -29,6 +29,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
                 "plan": commands.plan,
                 "materials": commands.materials,
                 "evaluate": evaluate,
+                "weights": weights.weights,
                 "doctor": commands.doctor,
             },
             prog="jaxphys",
