@@ -13,7 +13,7 @@ from flax import nnx
 from . import transformer
 from .diffusers_config import DiffusersConfig
 from .layers import Conv2d, GroupNorm, Linear
-from .resnet import Downsample, ResnetBlock, Upsample
+from .resnet import COSTLY, Downsample, ResnetBlock, Upsample
 from .transformer import Attention
 
 Array = jax.Array
@@ -69,10 +69,11 @@ def _resnets(inputs: int, outputs: int, count: int, config: AutoencoderConfig) -
 
 
 def _through(blocks: Sequence[nnx.Module], x: Array) -> Array:
-    """One block after the other. A gradient computes the inside of each again: at full size, the
-    insides of all would take gigabytes."""
+    """One block after the other. A gradient computes the inside of each again, but for the
+    convolutions: at full size, the insides of all would take gigabytes."""
+    policy = jax.checkpoint_policies.save_only_these_names(COSTLY)
     for block in blocks:
-        x = jax.checkpoint(lambda x, block=block: block(x))(x)
+        x = jax.checkpoint(block, policy=policy)(x)
     return x
 
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 from flax import nnx
+from jax.ad_checkpoint import checkpoint_name
 
 from .layers import Conv2d, GroupNorm, Linear, Padding
 
 Array = jax.Array
+COSTLY = "costly"  # what is worth keeping where a gradient computes the rest again
 
 
 class ResnetBlock(nnx.Module):
@@ -27,7 +29,7 @@ class ResnetBlock(nnx.Module):
 
     def __call__(self, x: Array, time: Array | None = None) -> Array:
         """time: (B, time), where the block was made to be told."""
-        inner = self.conv1(jax.nn.silu(self.norm1(x)))
+        inner = checkpoint_name(self.conv1(jax.nn.silu(self.norm1(x))), COSTLY)
         if self.time_emb_proj is not None:
             inner = inner + self.time_emb_proj(jax.nn.silu(time))[:, None, None]
         inner = self.conv2(jax.nn.silu(self.norm2(inner)))
