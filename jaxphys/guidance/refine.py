@@ -3,56 +3,60 @@ better.
 
 The stage and the two parts of its instruction, context and task, are those of the paper: short
 prompts are elaborated, long ones reduced, backgrounds removed, the result is separated by commas.
-A language model does it if an OpenAI-compatible endpoint is configured; otherwise fixed rules do.
+Whoever is there is asked in turn: an endpoint, a language model in this process, fixed rules. An
+answer that cannot be used is asked for again, then the next one is; the record says so.
 """
 
-import json
 import os
-import urllib.error
-import urllib.request
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal, Protocol
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, nearest
+from jaxphys.guidance.refine_check import mended, problem
+from jaxphys.guidance.refine_endpoint import ADDRESS, Unanswered, find_endpoint
+from jaxphys.guidance.refine_local import PATH, find_local
 from jaxphys.guidance.refine_offline import refine_offline
 
-ENDPOINT = "JAXPHYS_LLM_URL"
-KEY = "JAXPHYS_LLM_KEY"
-MODEL = "JAXPHYS_LLM_MODEL"
+Refiner = Literal["auto", "endpoint", "local", "rules"]
+REFINERS = ("auto", "endpoint", "local", "rules")
 LONGEST_PROMPT = 2000
-LONGEST_REPLY = 64 * 1024
-TIMEOUT = 60.0
-
-TASK = (
-    "Rewrite this prompt for a text-to-3D model that knows only simple descriptions. Answer with "
-    "the rewritten prompt alone: one line, the object first, then its traits separated by commas "
-    "(shape, parts, colours, material, surface). If the prompt is short or vague, add fitting "
-    "visual details. If it is long or involved, keep its essence and drop the rest; resolve "
-    "contradictions. Describe one object by itself: leave out background, place, lighting, camera, "
-    "people and story."
-)
+ATTEMPTS = 3
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """A prompt before and after.
+    """A prompt before and after, and how it came about.
 
     Attributes:
         original: as the user wrote it.
         refined: comma-separated, what guidance reads.
-        how: "endpoint (model name)", or which fixed rules were applied.
+        how: who answered: "endpoint (model)", "local (model)", or which fixed rules were applied.
+        instruction: what was asked, "" for rules.
+        answer: the raw answer that `refined` was made of.
+        attempts: what was asked in vain before: "who: problem".
     """
 
     original: str
     refined: str
     how: str
+    instruction: str = ""
+    answer: str = ""
+    attempts: tuple[str, ...] = ()
 
 
-def instruction(prompt: str) -> str:
-    """What a language model is asked: the context part with the prompt, then the task part."""
-    return (
-        f"Context: the prompt of a text-to-3D generation is: {json.dumps(prompt)}\n\nTask: {TASK}"
-    )
+class Asked(Protocol):
+    """A language model that refines prompts."""
+
+    @property
+    def who(self) -> str:
+        """As the record names it."""
+
+    def instruction(self, prompt: str) -> str:
+        """What it is asked for a prompt, as text."""
+
+    def ask(self, prompt: str, attempt: int) -> str:
+        """Its raw answer; another one for another `attempt`. Raises Unanswered."""
 
 
 def check_prompt(prompt: str) -> str:
@@ -67,74 +71,57 @@ def check_prompt(prompt: str) -> str:
     return line
 
 
-def refine(prompt: str, environment: Mapping[str, str] = os.environ) -> Refinement:
+def refine(
+    prompt: str, environment: Mapping[str, str] = os.environ, how: Refiner = "auto"
+) -> Refinement:
     """The prompt, refined.
 
     Args:
         prompt: any text of up to 2000 characters.
-        environment: where JAXPHYS_LLM_URL (base address of an OpenAI-compatible API, such as
-            `http://localhost:8000/v1`), JAXPHYS_LLM_MODEL and, if it needs one, JAXPHYS_LLM_KEY
-            are looked up. Without an address the offline rules refine.
+        environment: JAXPHYS_LLM_URL is the base address of an OpenAI-compatible API, such as
+            `http://localhost:8000/v1`, JAXPHYS_LLM_MODEL its model (default gpt-4) and
+            JAXPHYS_LLM_KEY its key; JAXPHYS_LLM_PATH is a local model, a .gguf file or a folder.
+            Without that, SmolLM2 counts where `jaxphys weights fetch smollm2` has put it.
+        how: "auto" asks whoever is there, in that order; else only the one named and, if it fails,
+            the rules.
 
     Raises:
-        InputError: an unusable prompt, a half-configured endpoint, or one that does not answer.
+        InputError: an unusable prompt, a wrong setting, or nobody there of the kind named.
     """
     line = check_prompt(prompt)
-    address = environment.get(ENDPOINT, "").strip()
-    if not address:
-        refined, rules = refine_offline(line)
-        return Refinement(prompt, refined, f"offline rules, no language model ({rules})")
-    model = environment.get(MODEL, "").strip()
-    if not model:
-        raise InputError(f"{MODEL}: is not set though {ENDPOINT} is; name the model to ask")
-    answer = _ask(address, model, environment.get(KEY, "").strip(), instruction(line))
-    return Refinement(prompt, _clean(answer, address), f"endpoint ({model})")
+    attempts = []
+    for model in _models(environment, how):
+        for attempt in range(ATTEMPTS):
+            try:
+                answer = model.ask(line, attempt)
+            except Unanswered as error:
+                attempts.append(f"{model.who}: {error}")
+                break
+            refined = mended(answer)
+            if (wrong := problem(refined, line)) is None:
+                asked = model.instruction(line)
+                return Refinement(prompt, refined, model.who, asked, answer, tuple(attempts))
+            attempts.append(f"{model.who}: the answer {wrong}")
+    refined, rules = refine_offline(line)
+    who = f"offline rules, no language model ({rules})"
+    return Refinement(prompt, refined, who, attempts=tuple(attempts))
 
 
-def _ask(address: str, model: str, key: str, text: str) -> str:
-    """The reply of a chat completion endpoint at temperature 0. The key goes nowhere but the
-    header.
-    """
-    if not address.startswith(("http://", "https://")):
-        raise InputError(f"{ENDPOINT}: must begin with http:// or https://")
-    body = {
-        "model": model,
-        "messages": [{"role": "user", "content": text}],
-        "temperature": 0,
-        "seed": 0,
-    }
-    headers = {"Content-Type": "application/json"}
-    if key:
-        headers["Authorization"] = f"Bearer {key}"
-    try:
-        request = urllib.request.Request(
-            address.rstrip("/") + "/chat/completions", json.dumps(body).encode(), headers
-        )
-        with urllib.request.urlopen(request, timeout=TIMEOUT) as reply:
-            data = json.loads(reply.read(LONGEST_REPLY))
-    except urllib.error.HTTPError as error:
-        error.close()
-        raise InputError(
-            f"{ENDPOINT}: the endpoint answered {error.code}; check {KEY} and {MODEL}, "
-            f"or unset {ENDPOINT} to refine offline"
-        ) from None
-    except (OSError, ValueError):
-        raise InputError(
-            f"{ENDPOINT}: no usable answer; check it, or unset it to refine offline"
-        ) from None
-    try:
-        return str(data["choices"][0]["message"]["content"])
-    except (KeyError, IndexError, TypeError):
-        raise InputError(
-            f"{ENDPOINT}: the answer is no chat completion; is it OpenAI-compatible?"
-        ) from None
-
-
-def _clean(answer: str, address: str) -> str:
-    """One printable line of comma-separated traits out of a model's reply."""
-    printable = "".join(c if c.isprintable() else " " for c in answer)
-    parts = [" ".join(part.split()).strip(" .\"'`") for part in printable.split(",")]
-    refined = ", ".join(part for part in parts if part)[:LONGEST_PROMPT]
-    if not any(character.isalnum() for character in refined):
-        raise InputError(f"{ENDPOINT}: the model answered nothing; try another {MODEL}")
-    return refined
+def _models(environment: Mapping[str, str], how: Refiner) -> Iterator[Asked]:
+    """Who is to be asked before the rules; each is set up only when its turn comes."""
+    if how not in REFINERS:
+        raise InputError(f"refiner {how!r}: {nearest(how, REFINERS)}")
+    if how in ("auto", "endpoint"):
+        endpoint = find_endpoint(environment)
+        if endpoint is None and how == "endpoint":
+            raise InputError(f"refiner endpoint: {ADDRESS} is not set; name the API's address")
+        if endpoint is not None:
+            yield endpoint
+    if how in ("auto", "local"):
+        local = find_local(environment)
+        if local is None and how == "local":
+            raise InputError(
+                f"refiner local: there is none; `jaxphys weights fetch smollm2`, or set {PATH}"
+            )
+        if local is not None:
+            yield local

@@ -98,7 +98,7 @@ def _refined(generation: Generation, out: Path) -> Refinement:
         known = read_json(out / "prompt.json")
         if known.get("original") == generation.prompt and set(known) == FIELDS:
             return Refinement(**known)
-    return refine(generation.prompt)
+    return refine(generation.prompt, how=generation.refiner)
 
 
 def _gaussians(
