@@ -84,15 +84,15 @@ def coarser(pictures: np.ndarray) -> np.ndarray:
 
 def make(folder: Path, steps: int | None, seed: int) -> None:
     """Generates what is missing in `folder`, each from its refined sentence."""
-    from jaxphys.guidance.optimise import OptimiseConfig, text_to_gaussians
     from jaxphys.guidance.choice import BUNDLED, require
+    from jaxphys.guidance.optimise import OptimiseConfig, text_to_gaussians
 
     require(BUNDLED, BUNDLED)
     config = OptimiseConfig() if steps is None else OptimiseConfig(steps=steps)
     for prompt, sentence in SENTENCES.items():
         path = path_of(folder, prompt)
         if not path.exists():
-            refined = refine(sentence).refined
+            refined = refine(sentence, how="rules").refined
             print(f"{prompt}: {refined}", flush=True)
             path.parent.mkdir(parents=True, exist_ok=True)
             write_ply(path, text_to_gaussians(refined, seed=seed, config=config, progress=True))

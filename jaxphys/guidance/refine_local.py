@@ -17,7 +17,6 @@ from pathlib import Path
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.language_model import LanguageModel, Message, Sampling
 from jaxphys.guidance.refine_check import words_of
-from jaxphys.guidance.refine_endpoint import Unanswered
 from jaxphys.guidance.refine_offline import LONG, without_background
 from jaxphys.guidance.refine_subject import subject
 from jaxphys.weights.resolve import locate

@@ -1,5 +1,7 @@
 import dataclasses
 import json
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import numpy as np
 import pytest
@@ -9,6 +11,8 @@ import jaxphys.guidance.optimise as optimise
 import jaxphys.guidance.priors as priors
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
+from jaxphys.guidance.refine import Refinement
+from jaxphys.pipeline import generate as generate_module
 from jaxphys.pipeline.generate import generate
 from jaxphys.scene import Domain, Object, Scene, read_scene
 
@@ -77,3 +81,52 @@ def test_missing_weights_are_said_before_anything_is_written(tmp_path, monkeypat
     with pytest.raises(InputError, match="without the weights pixel_prior"):
         generate("a strawberry", Scene(), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_an_endpoint_s_answer_reaches_the_video(tmp_path, monkeypatch):
+    """With the bundled priors themselves; the key stays out of every file."""
+    content = "a strawberry, red heart-shaped fruit, small yellow seeds, green leafy cap"
+    key = "secret-key-0123456789"
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self):
+            self.send_response(200)
+            self.end_headers()
+            self.wfile.write(json.dumps({"choices": [{"message": {"content": content}}]}).encode())
+
+        def log_message(self, *_):
+            """Silent."""
+
+    server = HTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,), daemon=True)
+    thread.start()
+    monkeypatch.setenv("JAXPHYS_LLM_URL", f"http://127.0.0.1:{server.server_port}/v1")
+    monkeypatch.setenv("JAXPHYS_LLM_KEY", key)
+    try:
+        out = generate("a strawberry", SCENE, tmp_path / "run", steps=0, splats=60)
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+    prompt = json.loads((out / "prompt.json").read_text())
+    assert prompt["refined"] == content == prompt["answer"] and prompt["how"] == "endpoint (gpt-4)"
+    assert "Context:" in prompt["instruction"] and prompt["attempts"] == []
+    assert (out / "motion.mp4").stat().st_size > 0
+    files = [path for path in out.rglob("*") if path.is_file()]
+    assert len(files) > 4 and not any(key.encode() in path.read_bytes() for path in files)
+
+
+def test_an_unfinished_run_keeps_its_prompt(calls, tmp_path, monkeypatch):
+    """A language model may answer otherwise the second time; the run would begin anew."""
+
+    def interrupt(stage, frame):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(generate_module, "refine", lambda p, how: Refinement(p, "first", "test"))
+    with pytest.raises(KeyboardInterrupt):
+        generate("a can", SCENE, tmp_path, watch=interrupt)
+    monkeypatch.setattr(generate_module, "refine", lambda p, how: Refinement(p, "second", "test"))
+    generate("a can", SCENE, tmp_path)
+    assert [prompt for prompt, *_ in calls] == ["first"]
+    generate("a can", SCENE, tmp_path)
+    assert json.loads((tmp_path / "prompt.json").read_text())["refined"] == "second"
