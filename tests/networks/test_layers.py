@@ -10,30 +10,34 @@ from jaxphys.networks.layers import LEAST_FOR_TAPS, convolve, product
 PADDING = ((1, 0), (2, 1))
 
 
-def plain(x, kernel, padding=PADDING):
+def plain(x, kernel, stride, padding):
     numbers = ("NHWC", "HWIO", "NHWC")
-    return lax.conv_general_dilated(x, kernel, (1, 1), padding, dimension_numbers=numbers)
+    return lax.conv_general_dilated(x, kernel, (stride,) * 2, padding, dimension_numbers=numbers)
 
 
-def inputs(channels: int, dtype):
-    x = pseudo_random("x", (2, 5, 6, channels))
-    kernel = pseudo_random("kernel", (3, 2, channels, 3), channels**-0.5)
-    return jnp.asarray(x, dtype), jnp.asarray(kernel, dtype)
+def with_gradients(function, channels: int, stride: int, padding, dtype) -> list[np.ndarray]:
+    """The result, and its product's gradients to the picture and the kernel."""
+    x = jnp.asarray(pseudo_random("x", (2, 5, 6, channels)), dtype)
+    kernel = jnp.asarray(pseudo_random("kernel", (3, 2, channels, 3), channels**-0.5), dtype)
+    y, pull = jax.vjp(lambda x, kernel: function(x, kernel, stride, padding), x, kernel)
+    gradients = pull(jnp.asarray(pseudo_random("gradient", y.shape), dtype))
+    return [np.asarray(array, np.float64) for array in (y, *gradients)]
 
 
-def with_gradients(function, x, kernel):
-    y, pull = jax.vjp(function, x, kernel)
-    return [np.asarray(array, np.float64) for array in (y, *pull(jnp.cos(y)))]
+@pytest.mark.parametrize("stride", [1, 2])
+@pytest.mark.parametrize("padding", [PADDING, ((0, 0), (0, 0)), ((0, 1), (0, 1))])
+def test_convolution_and_its_gradients(stride, padding):
+    case = (2, stride, padding, jnp.float64)
+    found, expected = (with_gradients(function, *case) for function in (convolve, plain))
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-12)
 
 
 @pytest.mark.parametrize("channels", [LEAST_FOR_TAPS - 1, LEAST_FOR_TAPS])
-def test_convolution_of_half_precision_is_one_with_its_gradients(channels):
-    """Whichever way it goes: alone the numbers of half precision differ from exact sums."""
-    x, kernel = inputs(channels, jnp.bfloat16)
-    found = with_gradients(lambda x, kernel: convolve(x, kernel, 1, PADDING), x, kernel)
-    exact = with_gradients(plain, x.astype(jnp.float64), kernel.astype(jnp.float64))
-    for one, other in zip(found, exact, strict=True):
-        assert one.shape == other.shape
+def test_convolution_of_half_precision_is_one_whichever_way_it_goes(channels):
+    found = with_gradients(convolve, channels, 1, PADDING, jnp.bfloat16)
+    expected = with_gradients(plain, channels, 1, PADDING, jnp.float64)
+    for one, other in zip(found, expected, strict=True):
         assert np.max(np.abs(one - other)) < 0.02 * np.max(np.abs(other))
 
 
