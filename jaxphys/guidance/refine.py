@@ -25,6 +25,16 @@ ATTEMPTS = 3
 
 
 @dataclass(frozen=True)
+class Attempt:
+    """A question that brought no usable answer: who was asked, what was wrong, and the raw answer
+    if there was one."""
+
+    who: str
+    problem: str
+    answer: str = ""
+
+
+@dataclass(frozen=True)
 class Refinement:
     """A prompt before and after, and how it came about.
 
@@ -33,8 +43,8 @@ class Refinement:
         refined: comma-separated, what guidance reads.
         how: who answered: "endpoint (model)", "local (model)", or which fixed rules were applied.
         instruction: what was asked, "" for rules.
-        answer: the raw answer that `refined` was made of.
-        attempts: what was asked in vain before: "who: problem".
+        answer: the raw answer that `refined` was made of, "" for rules.
+        attempts: what was asked in vain before.
     """
 
     original: str
@@ -42,7 +52,7 @@ class Refinement:
     how: str
     instruction: str = ""
     answer: str = ""
-    attempts: tuple[str, ...] = ()
+    attempts: tuple[Attempt, ...] = ()
 
 
 class Asked(Protocol):
@@ -79,9 +89,10 @@ def refine(
     Args:
         prompt: any text of up to 2000 characters.
         environment: JAXPHYS_LLM_URL is the base address of an OpenAI-compatible API, such as
-            `http://localhost:8000/v1`, JAXPHYS_LLM_MODEL its model (default gpt-4) and
-            JAXPHYS_LLM_KEY its key; JAXPHYS_LLM_PATH is a local model, a .gguf file or a folder.
-            Without that, SmolLM2 counts where `jaxphys weights fetch smollm2` has put it.
+            `http://localhost:8000/v1`, JAXPHYS_LLM_MODEL its model (default gpt-4),
+            JAXPHYS_LLM_KEY its key and JAXPHYS_LLM_TIMEOUT how many seconds it may take (60);
+            JAXPHYS_LLM_PATH is a local model, a .gguf file or a folder. Without that, SmolLM2
+            counts where `jaxphys weights fetch smollm2` has put it.
         how: "auto" asks whoever is there, in that order; else only the one named and, if it fails,
             the rules.
 
@@ -95,13 +106,13 @@ def refine(
             try:
                 answer = model.ask(line, attempt)
             except Unanswered as error:
-                attempts.append(f"{model.who}: {error}")
+                attempts.append(Attempt(model.who, str(error)))
                 break
-            refined = mended(answer)
+            refined = mended(answer, line)
             if (wrong := problem(refined, line)) is None:
                 asked = model.instruction(line)
                 return Refinement(prompt, refined, model.who, asked, answer, tuple(attempts))
-            attempts.append(f"{model.who}: the answer {wrong}")
+            attempts.append(Attempt(model.who, f"the answer {wrong}", answer))
     refined, rules = refine_offline(line)
     who = f"offline rules, no language model ({rules})"
     return Refinement(prompt, refined, who, attempts=tuple(attempts))

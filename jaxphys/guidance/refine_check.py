@@ -3,17 +3,32 @@ refused with a reason.
 """
 
 import re
+import unicodedata
 
-from jaxphys.guidance.refine_offline import FILLER, refine_offline, without_background
+from jaxphys.guidance.refine_offline import without_background
+from jaxphys.guidance.refine_subject import subject
 
 FEWEST_PARTS = 3
 FEWEST_WORDS, MOST_WORDS = 5, 60
-# Words by which an answer speaks of the task, or of a picture instead of the object.
+MOST_WORDS_OF_PART = 10
+# Words by which an answer speaks of the task instead of the object ...
 ECHOES = (
     "rewrite", "rewritten", "refined", "prompt", "task", "context", "instruction", "instructions",
-    "sure", "sorry", "user", "assistant", "comma", "commas",
+    "text-to-3d", "sure", "sorry", "user", "assistant", "comma", "commas",
 )  # fmt: skip
-PLACES = ("background", "backdrop", "scene", "scenery", "setting", "landscape")
+# ... of a picture or a place ...
+SCENERY = (
+    "background", "backdrop", "scene", "scenery", "setting", "landscape", "surroundings",
+    "atmosphere", "environment", "lighting", "sunlight", "sunset", "sunrise", "studio", "camera",
+    "photo", "photograph", "photography", "render", "rendering", "bokeh",
+)  # fmt: skip
+# ... or to somebody, or tells a story.
+TALK = {"i", "you", "he", "she", "we", "they", "it", "his", "her", "please", "hope", "let"}
+# Words at the end of a part that lead nowhere.
+LOOSE_ENDS = {
+    "at", "on", "in", "of", "with", "and", "the", "a", "an", "to", "by", "for", "or", "sitting",
+    "standing", "lying", "parked", "placed", "floating",
+}  # fmt: skip
 OPENING = re.compile(
     r"^[^,:]{0,60}\b(here|prompt|answer|sure|refined|rewritten)\b[^,:]{0,40}:", re.I
 )
@@ -24,19 +39,37 @@ def words_of(text: str) -> list[str]:
     return re.findall(r"[\w'-]+", text.lower())
 
 
-def mended(answer: str) -> str:
+def mended(answer: str, prompt: str) -> str:
     """One printable line of parts separated by commas: without an opening ("Here is:"), bullets,
-    quotes, surroundings and repeated parts."""
+    quotes, surroundings, remarks and parts that say nothing new."""
     text = OPENING.sub("", answer.strip().strip("`\"' \n"))
-    text = re.sub(r"\n\s*(?:[-*•]|\d+[.)])?\s*", ", ", text)
+    text = re.sub(r"(?:^|\n)\s*(?:[-*•]|\d+[.)])?\s*", ", ", text)
     text = "".join(character if character.isprintable() else " " for character in text)
-    text = without_background(text)[0]
-    parts = [" ".join(part.split()).strip(" .;:\"'`*-") for part in re.split(r"[,;]", text)]
-    distinct: dict[str, str] = {}
-    for part in parts:
-        if part:
-            distinct.setdefault(part.lower(), part)
-    return ", ".join(distinct.values())
+    kept, said, asked = [], set(), set(words_of(prompt))
+    for part in re.split(r"[,;.]", text):
+        part = _trimmed(without_background(part)[0] or ("" if kept else part))
+        words = set(words_of(part)) - LOOSE_ENDS
+        if words <= said or (kept and not _is_trait(part, asked)):
+            continue
+        kept.append(part)
+        said |= words
+    return ", ".join(kept)
+
+
+def _trimmed(part: str) -> str:
+    """A part without the marks and loose words around it."""
+    words = part.strip(" .;:!?\"'`*-").split()
+    while words and words[0].lower() in ("and", "or"):
+        words = words[1:]
+    while words and words[-1].lower() in LOOSE_ENDS:
+        words = words[:-1]
+    return " ".join(words).strip(" .;:!?\"'`*-")
+
+
+def _is_trait(part: str, asked: set[str]) -> bool:
+    words = words_of(part)
+    strange = TALK | (set(SCENERY) - asked)
+    return len(words) <= MOST_WORDS_OF_PART and strange.isdisjoint(words)
 
 
 def problem(refined: str, prompt: str) -> str | None:
@@ -49,24 +82,35 @@ def problem(refined: str, prompt: str) -> str | None:
     if refined.count(",") + 1 < FEWEST_PARTS:
         return f"has fewer than {FEWEST_PARTS} parts separated by commas"
     asked = words_of(prompt)
-    for kind, listed in (("task", ECHOES), ("surroundings", PLACES)):
+    for kind, listed in (("task", ECHOES), ("surroundings", SCENERY)):
         spoken = [word for word in listed if word in words and word not in asked]
         if spoken:
             return f"speaks of the {kind} ({spoken[0]})"
-    named = object_words(prompt)
-    kept = [word for word in named if any(same(word, other) for other in words)]
-    if 2 * len(kept) < len(named):
-        missing = [word for word in named if word not in kept]
-        return f"does not name the object ({' '.join(missing)})"
+    nouns = [noun for noun in subject(prompt).nouns if _plain(noun).isascii()]
+    lost = [noun for noun in nouns if not _names(refined, noun)]
+    if lost:
+        return f"does not name the object ({' '.join(lost)})"
+    if nouns and not any(_names(refined.split(",")[0], noun) for noun in nouns):
+        return f"does not begin with the object ({nouns[0]})"
     return None
 
 
-def object_words(prompt: str) -> list[str]:
-    """Words that tell what the user asked for: of the part of the prompt that names the object."""
-    subject = refine_offline(prompt)[0].split(",")[0]
-    return [word for word in words_of(subject) if word not in FILLER] or words_of(subject)
+def _names(text: str, noun: str) -> bool:
+    """Whether a text holds a noun, in singular or plural, in one word or two."""
+    forms, joined = _forms(noun), _plain(text).replace(" ", "-")
+    return any(forms & _forms(word) for word in words_of(text)) or (
+        "-" in noun and _plain(noun) in joined
+    )
 
 
-def same(word: str, other: str) -> bool:
-    """Whether two words are one but for a plural."""
-    return word == other or word.rstrip("s") == other.rstrip("s")
+def _forms(word: str) -> set[str]:
+    word = _plain(word)
+    endings = (("ies", "y"), ("ves", "f"), ("es", ""), ("s", ""))
+    return {word, *(word.removesuffix(old) + new for old, new in endings if word.endswith(old))}
+
+
+def _plain(text: str) -> str:
+    """Lower case without accents. Names in other scripts stay what they are: nobody can say here
+    how an answer in English would call them."""
+    decomposed = unicodedata.normalize("NFKD", text.lower())
+    return "".join(character for character in decomposed if not unicodedata.combining(character))

@@ -17,6 +17,7 @@ from pathlib import Path
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.language_model import LanguageModel, Message, Sampling
 from jaxphys.guidance.refine_check import words_of
+from jaxphys.guidance.refine_endpoint import Unanswered
 from jaxphys.guidance.refine_offline import LONG, without_background
 from jaxphys.guidance.refine_subject import subject
 from jaxphys.weights.resolve import locate
@@ -51,19 +52,20 @@ REDUCE = (
 )
 REDUCED = (
     (
+        "my favourite windmill, the one that we saw on holiday with its four white sails turning in"
+        " the wind, and a pointed red roof and a round stone tower",
+        "windmill, four white sails, pointed red roof, round stone tower",
+    ),
+    (
+        "a brave knight who has not slept for three nights, dressed in shiny steel armour, carrying"
+        " a round wooden shield with a lion painted on it and a long sword, because the king sent"
+        " him to find a ring",
+        "brave knight, shiny steel armour, round wooden shield with a lion, long sword",
+    ),
+    (
         "I want to see a tall blue bottle that my uncle brought from Spain, it has a cork in it"
         " and a yellow label, standing on a table in a bar",
         "tall blue bottle, cork, yellow label",
-    ),
-    (
-        "a bicycle which was ridden around the whole world, very rusty now, with a wicker basket"
-        " full of flowers, leaning against a wall in the evening sun",
-        "bicycle, very rusty, wicker basket full of flowers",
-    ),
-    (
-        "there was once an elephant who dreamed of flying, so he wore big paper wings tied with a"
-        " string, his skin is grey and his tusks are white",
-        "elephant, big paper wings, grey skin, white tusks",
     ),
 )
 LINKS = ", a with and the of"  # words that a reduced prompt may add
@@ -72,8 +74,9 @@ LINKS = ", a with and the of"  # words that a reduced prompt may add
 class LocalModel:
     """A language model on disk, read when it is first asked."""
 
-    def __init__(self, path: Path):
-        self._path = path
+    def __init__(self, path: Path, *, chosen: bool = True):
+        """`chosen`: the user named it, so that it is a mistake if it cannot be read."""
+        self._path, self._chosen = path, chosen
 
     @property
     def who(self) -> str:
@@ -81,7 +84,12 @@ class LocalModel:
 
     @cached_property
     def _model(self) -> LanguageModel:
-        return LanguageModel.load(self._path)
+        try:
+            return LanguageModel.load(self._path)
+        except InputError as error:
+            if self._chosen:
+                raise
+            raise Unanswered(str(error)) from None
 
     def instruction(self, prompt: str) -> str:
         """The conversation that is sent, turn by turn, up to the words that the answer is made to
@@ -90,9 +98,13 @@ class LocalModel:
         return "\n".join([*turns, f"assistant: {beginning(prompt)}"])
 
     def ask(self, prompt: str, attempt: int) -> str:
-        """The answer: the likeliest at first, draws for later attempts. Raises InputError if the
-        model cannot be read."""
-        long, spread = is_long(prompt), 0.0 if attempt == 0 else 0.5
+        """The answer: the likeliest at first, draws for later attempts.
+
+        Raises:
+            Unanswered: the prompt is too long for the model, or the model that was found cannot be
+                read; InputError if the user named it.
+        """
+        model, long, spread = self._model, is_long(prompt), 0.0 if attempt == 0 else 0.5
         sampling = Sampling(
             temperature=spread,
             seed=attempt,
@@ -100,16 +112,19 @@ class LocalModel:
             plausible=0.1,
             guidance=1.0 if long else 2.0,
         )
-        return self._model.answer(
-            conversation(prompt),
-            max_tokens=MOST_TOKENS,
-            begin=beginning(prompt),
-            until=_is_over,
-            only=f"{LINKS} {without_background(prompt)[0]}" if long else None,
-            without=None if long else conversation(ANY_OBJECT),
-            begin_without=beginning(ANY_OBJECT),
-            sampling=sampling,
-        )
+        try:
+            return model.answer(
+                conversation(prompt),
+                max_tokens=MOST_TOKENS,
+                begin=beginning(prompt),
+                until=_is_over,
+                only=f"{LINKS} {without_background(prompt)[0]}" if long else None,
+                without=None if long else conversation(ANY_OBJECT),
+                begin_without=beginning(ANY_OBJECT),
+                sampling=sampling,
+            )
+        except InputError as error:
+            raise Unanswered(str(error)) from None
 
 
 def is_long(prompt: str) -> bool:
@@ -149,6 +164,7 @@ def find_local(environment: Mapping[str, str]) -> LocalModel | None:
             raise InputError(f"{PATH}: {path} is missing; name a .gguf file or a folder")
         return LocalModel(path)
     try:
-        return LocalModel(locate("smollm2", fetch=False, environment=environment))
+        found = locate("smollm2", fetch=False, environment=environment)
     except InputError:
         return None  # it is not here, which is no mistake
+    return LocalModel(found, chosen=False)

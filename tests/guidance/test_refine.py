@@ -5,12 +5,12 @@ from jaxphys.guidance.refine import refine
 
 
 def test_short_prompts_are_elaborated():
-    result = refine("a strawberry", {})
+    result = refine("a strawberry", {}, "rules")
     assert result.original == "a strawberry"
     assert result.refined.startswith("a strawberry, ") and "seeds" in result.refined
     assert result.how.startswith("offline") and "elaborated" in result.how
     # An object the rules do not know still gets a fuller description.
-    assert refine("a zorgle", {}).refined.count(",") >= 3
+    assert refine("a zorgle", {}, "rules").refined.count(",") >= 3
 
 
 def test_long_prompts_are_reduced_and_keep_their_object():
@@ -18,7 +18,7 @@ def test_long_prompts_are_reduced_and_keep_their_object():
         "I would really like to see a small vintage teapot that has a curved golden spout and a "
         "painted blue dragon which is chasing a tiny phoenix around it while steam rises slowly"
     )
-    result = refine(prompt, {})
+    result = refine(prompt, {}, "rules")
     assert "reduced" in result.how
     assert len(result.refined) < len(prompt) and result.refined.count(",") <= 5
     assert "teapot" in result.refined and "golden spout" in result.refined
@@ -33,27 +33,28 @@ def test_long_prompts_are_reduced_and_keep_their_object():
     ],
 )
 def test_backgrounds_are_removed(prompt, gone):
-    refined = refine(prompt, {}).refined
+    refined = refine(prompt, {}, "rules").refined
     assert not any(word in refined for word in gone)
     assert refined.startswith(prompt.split()[0])
 
 
 def test_what_an_object_holds_is_not_background():
-    assert refine("a vase with flowers", {}).refined.startswith("a vase with flowers")
-    assert "cone" in refine("vanilla ice in a cone", {}).refined
+    assert refine("a vase with flowers", {}, "rules").refined.startswith("a vase with flowers")
+    assert "cone" in refine("vanilla ice in a cone", {}, "rules").refined
 
 
 def test_refinement_is_deterministic():
-    assert refine("a guitar", {}) == refine("a guitar", {})
+    assert refine("a guitar", {}, "rules") == refine("a guitar", {}, "rules")
 
 
 @pytest.mark.parametrize("prompt", ["", "   ", "?!", "a\x00b", "x" * 3000])
 def test_unusable_prompts(prompt):
     with pytest.raises(InputError, match=r"^prompt: "):
-        refine(prompt, {})
+        refine(prompt, {}, "rules")
 
 
-def test_what_is_not_there_is_said():
+def test_what_is_not_there_is_said(monkeypatch):
+    monkeypatch.setattr("jaxphys.guidance.refine.find_local", lambda environment: None)
     for how, said in (("endpoint", "JAXPHYS_LLM_URL"), ("local", "weights fetch smollm2")):
         with pytest.raises(InputError, match=said):
             refine("a rose", {}, how)
