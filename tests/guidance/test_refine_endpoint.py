@@ -198,19 +198,17 @@ def test_whoever_is_left_waiting_is_hung_up_on(server):
 
 def test_the_time_is_for_all_answers_together(server):
     def slow(handler):
-        time.sleep(0.4)
+        time.sleep(0.8)
         handler.reply(completion("no"))
 
-    server.environment["JAXPHYS_LLM_TIMEOUT"] = "0.7"
+    server.environment["JAXPHYS_LLM_TIMEOUT"] = "2"
     server.behave = slow
     find_endpoint(server.environment)
     begin = time.monotonic()
     result = refine("a rose", server.environment)
-    assert time.monotonic() - begin < 1.1
-    assert [attempt.problem for attempt in result.attempts] == [
-        "the answer has 1 words instead of 5 to 60",
-        "no answer within 0.7 s",
-    ]
+    assert time.monotonic() - begin < 4  # not 2 s for each of the answers
+    assert result.attempts[-1].problem == "no answer within 2 s"
+    assert "has 1 words" in result.attempts[0].problem
 
 
 def test_nobody_at_the_address(server):
