@@ -8,7 +8,7 @@ answer that cannot be used is asked for again, then the next one is; the record 
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -99,18 +99,24 @@ def refine(
     Raises:
         InputError: an unusable prompt, a wrong setting, or nobody there of the kind named.
     """
+    return refined_by(_models(environment, how), prompt)
+
+
+def refined_by(models: Iterable[Asked], prompt: str) -> Refinement:
+    """The prompt, refined by the first of these models that gives a usable answer, else by the
+    rules. Raises InputError for an unusable prompt.
+    """
     line = check_prompt(prompt)
     attempts = []
-    for model in _models(environment, how):
+    for model in models:
         for attempt in range(ATTEMPTS):
             try:
                 answer = model.ask(line, attempt)
             except Unanswered as error:
                 attempts.append(Attempt(model.who, str(error)))
                 break
-            refined = mended(answer, line)
-            if (wrong := problem(refined, line)) is None:
-                asked = model.instruction(line)
+            refined, asked = mended(answer, line), model.instruction(line)
+            if (wrong := problem(refined, line, asked)) is None:
                 return Refinement(prompt, refined, model.who, asked, answer, tuple(attempts))
             attempts.append(Attempt(model.who, f"the answer {wrong}", answer))
     refined, rules = refine_offline(line)

@@ -11,6 +11,7 @@ from jaxphys.guidance.refine_subject import subject
 FEWEST_PARTS = 3
 FEWEST_WORDS, MOST_WORDS = 5, 60
 MOST_WORDS_OF_PART = 10
+MOST_COPIED = 2  # parts; fewer may be chance
 # Words by which an answer speaks of the task instead of the object ...
 ECHOES = (
     "rewrite", "rewritten", "refined", "prompt", "task", "context", "instruction", "instructions",
@@ -72,8 +73,9 @@ def _is_trait(part: str, asked: set[str]) -> bool:
     return len(words) <= MOST_WORDS_OF_PART and strange.isdisjoint(words)
 
 
-def problem(refined: str, prompt: str) -> str | None:
-    """Why a mended answer cannot be used for the user's `prompt`; None if it can."""
+def problem(refined: str, prompt: str, instruction: str = "") -> str | None:
+    """Why a mended answer cannot be used for the user's `prompt`, where the model was asked by
+    `instruction`; None if it can."""
     words = words_of(refined)
     if not words:
         return "says nothing"
@@ -90,8 +92,15 @@ def problem(refined: str, prompt: str) -> str | None:
     lost = [noun for noun in nouns if not _names(refined, noun)]
     if lost:
         return f"does not name the object ({' '.join(lost)})"
-    if nouns and not any(_names(refined.split(",")[0], noun) for noun in nouns):
+    parts = refined.split(", ")
+    if nouns and not any(_names(parts[0], noun) for noun in nouns):
         return f"does not begin with the object ({nouns[0]})"
+    if any(2 * sum(_names(part, noun) for part in parts) > len(parts) > 3 for noun in nouns):
+        return f"goes in circles ({nouns[0]})"
+    told = set(re.split(r"[,.;:()\"\n]+ *", instruction))
+    copied = [part for part in parts[1:] if part in told and part not in prompt]
+    if len(copied) >= MOST_COPIED:
+        return f"repeats what it was told ({', '.join(copied[:MOST_COPIED])})"
     return None
 
 

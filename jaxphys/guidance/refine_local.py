@@ -104,12 +104,12 @@ class LocalModel:
             Unanswered: the prompt is too long for the model, or the model that was found cannot be
                 read; InputError if the user named it.
         """
-        model, long, spread = self._model, is_long(prompt), 0.0 if attempt == 0 else 0.5
+        model, long, spread = self._model, is_long(prompt), 0.0 if attempt == 0 else 0.7
         sampling = Sampling(
             temperature=spread,
             seed=attempt,
             penalty=2.0,
-            plausible=0.1,
+            plausible=0.1 if attempt == 0 else 0.03,
             guidance=1.0 if long else 2.0,
         )
         try:

@@ -10,6 +10,11 @@ PLACES = (
     "on", "in", "at", "under", "against", "behind", "near", "beside", "inside", "outside",
     "amid", "surrounded", "during", "while", "beneath", "above", "next",
 )  # fmt: skip
+# With one of these before them, whatever follows is the surroundings.
+POSTURES = {
+    "sitting", "standing", "lying", "leaning", "parked", "placed", "floating", "resting", "hanging",
+}  # fmt: skip
+BETWEEN = {*PLACES, "between", "among", "over", "from", "upon"}
 # What such a description speaks of; "in" alone may also say what the object holds or wears.
 SURROUNDINGS = (
     "background", "table", "desk", "floor", "room", "kitchen", "forest", "beach", "garden",
@@ -62,7 +67,8 @@ def without_background(text: str) -> tuple[str, bool]:
         cut = len(words)
         for i, word in enumerate(words):
             tail = _words(" ".join(words[i:]))
-            if word.lower() in PLACES and set(tail) & set(SURROUNDINGS):
+            placed = word.lower() in PLACES and set(tail) & set(SURROUNDINGS)
+            if placed or (word.lower() in POSTURES and set(tail[1:2]) & BETWEEN):
                 cut = i
                 break
         # "with a sunny background" and the like.

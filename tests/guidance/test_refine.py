@@ -30,6 +30,8 @@ def test_long_prompts_are_reduced_and_keep_their_object():
         ("a red rose on a wooden table in a sunny kitchen", ["table", "kitchen"]),
         ("a burger, soft studio lighting, with a blurred background", ["background"]),
         ("a microphone against a dark backdrop", ["backdrop"]),
+        ("a bicycle, leaning against an old caravan", ["leaning", "caravan"]),
+        ("a duck floating between soap bubbles", ["floating", "bubbles"]),
     ],
 )
 def test_backgrounds_are_removed(prompt, gone):
@@ -40,6 +42,7 @@ def test_backgrounds_are_removed(prompt, gone):
 
 def test_what_an_object_holds_is_not_background():
     assert refine("a vase with flowers", {}, "rules").refined.startswith("a vase with flowers")
+    assert "leaning tower" in refine("a leaning tower", {}, "rules").refined
     assert "cone" in refine("vanilla ice in a cone", {}, "rules").refined
 
 

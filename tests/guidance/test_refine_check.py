@@ -43,6 +43,7 @@ def test_answers_that_can_be_mended(answer):
         ("a garden flower, red petals, rose", r"does not begin with the object \(rose\)"),
         ("I'd rewrite the prompt as a rose, red petals, stem", r"speaks of the task \(rewrite\)"),
         ("a studio rose, red petals, green stem, thorns", "speaks of the surroundings"),
+        ("a rose, rose petals, rose leaves, a rose stem, thorns", r"goes in circles \(rose\)"),
         ("I cannot help with that.", "words|parts|name"),
     ],
 )
@@ -78,7 +79,17 @@ def test_all_that_is_named_must_be_there():
     assert problem("a cup, white glaze, round saucer, thin rim", "a cup and saucer") is None
 
 
+def test_what_was_told_is_no_answer():
+    told = 'Context: "a rose"\nTask: one line (shape, fine parts, bright colours, surface of it).'
+    echo = "a rose, fine parts, bright colours, green stem"
+    assert "repeats what it was told (fine parts, bright colours)" in problem(echo, "a rose", told)
+    assert problem(echo, "a rose") is None
+    # One part may be the same by chance, and the user's own words are free.
+    assert problem("a rose, fine parts, red colours, green stem", "a rose", told) is None
+    assert problem(echo, "a rose with fine parts, bright colours", told) is None
+
+
 def test_an_answer_never_grows_by_being_mended():
-    long = ", ".join(f"part{i} of a rose" for i in range(30))
+    long = ", ".join(["a rose", *(f"red part{i}" for i in range(40))])
     assert mended(long, "a rose") == long
     assert str(MOST_WORDS) in problem(long, "a rose")

@@ -77,6 +77,15 @@ def test_bad_answers_are_asked_for_again_then_the_rules_answer(speaker):
     assert len({sampling.seed for sampling in spread}) == ATTEMPTS
 
 
+def test_examples_are_no_answers(speaker):
+    good = "lighthouse, round white tower, red stripes, glass lantern"
+    _, environment = speaker("lighthouse, curved handlebar, leather saddle, red roof", good)
+    result = refine("a lighthouse", environment)
+    assert result.refined == good
+    (attempt,) = result.attempts
+    assert "repeats what it was told (curved handlebar, leather saddle)" in attempt.problem
+
+
 def test_short_prompts_are_elaborated_with_guidance(speaker):
     said, environment = speaker("rose, layered red petals, green stem, small thorns")
     refine("a rose", environment)
