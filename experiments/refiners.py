@@ -4,8 +4,8 @@
     python -m experiments.refiners --speed      # prints how long it takes and how much memory
 
 The prompts were written before any of the outputs was seen, and the model's instruction was tuned
-on others. Two checks (answers in circles, answers copied from the examples) and the words of posture
-among the surroundings came after a first look at the outputs.
+on others. Two checks (answers in circles, answers copied from the examples) and the words of
+posture among the surroundings came after a first look at the outputs.
 """
 
 import argparse
