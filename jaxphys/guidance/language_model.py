@@ -2,7 +2,8 @@
 
 One block of the network is compiled, and called once for each layer: that compiles ten times
 faster than the whole network in one program, and calls cost little beside the block's work.
-Texts are given room in powers of two, so that few lengths are compiled.
+Texts are given room in powers of two, and by the 256 from there on, so that few lengths are
+compiled and little is read that holds nothing.
 """
 
 from __future__ import annotations
@@ -19,11 +20,12 @@ from flax import nnx
 
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.language_checkpoint import END_OF_TURN, TURN, Checkpoint, open_checkpoint
-from jaxphys.networks.llama import Block, Cache, Llama
+from jaxphys.networks.joined import JoinedArrays
+from jaxphys.networks.llama import JOINED, Block, Cache, Llama
 from jaxphys.networks.parameters import fill
 
 Array = jax.Array
-SMALLEST_ROOM = 64
+SMALLEST_ROOM, ROOM = 64, 256
 FREE = ", a an the and with of"  # may be repeated
 IGNORED = (r"model\.layers\.\d+\.self_attn\.rotary_emb\.inv_freq",)
 
@@ -68,7 +70,7 @@ class _Text(NamedTuple):
 
 
 def _room(tokens: int) -> int:
-    return max(SMALLEST_ROOM, 1 << (tokens - 1).bit_length())
+    return max(SMALLEST_ROOM, min(1 << (tokens - 1).bit_length(), -(-tokens // ROOM) * ROOM))
 
 
 def _compiled(
@@ -154,8 +156,9 @@ class LanguageModel:
         """
         found = open_checkpoint(path)
         ignore = (*IGNORED, r"lm_head\.weight") if found.config.tie_word_embeddings else IGNORED
+        arrays = JoinedArrays(found.arrays, JOINED, source=str(path))
         model = fill(
-            lambda: Llama(found.config), found.arrays, source=str(path), ignore=ignore, dtype=dtype
+            lambda: Llama(found.config), arrays, source=str(path), ignore=ignore, dtype=dtype
         )
         return cls(found, model)
 
@@ -196,7 +199,7 @@ class LanguageModel:
 
     def _empty(self, capacity: int) -> Cache:
         config = self.config
-        shape = (1, config.num_key_value_heads, capacity, config.head_dim)
+        shape = (config.num_key_value_heads, capacity, config.head_dim)
         return tuple(
             (jnp.zeros(shape, self._dtype), jnp.zeros(shape, self._dtype)) for _ in self._blocks
         )

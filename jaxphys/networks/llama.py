@@ -1,8 +1,9 @@
 """The Llama network (Touvron et al. 2023): a decoder with rotary positions, grouped-query attention
 and gated feed-forward layers, which predicts the next token of a text.
 
-Attributes are named as the arrays of published checkpoints. What was read once is kept: a cache of
-keys and values makes the next token cost one row instead of a whole text.
+Attributes are named as the arrays of published checkpoints, but for those that are JOINED. What was
+read once is kept: a cache of keys and values makes the next token cost one row instead of a whole
+text.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ from .layers import Embedding, Linear
 from .llama_config import LlamaConfig
 
 Array = jax.Array
-# Keys and values (B, key heads, capacity, D) of every layer; written up to the text's length.
+# Keys and values (B * key heads, capacity, D) of every layer; written up to the text's length. With
+# more axes XLA would reshape them for its products, and copy them to do so, for every token.
 Cache = tuple[tuple[Array, Array], ...]
+JOINED = {"qkv_proj": ("q_proj", "k_proj", "v_proj"), "gate_up_proj": ("gate_proj", "up_proj")}
 
 
 class RMSNorm(nnx.Module):
@@ -56,9 +59,7 @@ class Attention(nnx.Module):
         self.config = config
         width, inner = config.hidden_size, config.num_attention_heads * config.head_dim
         shared = config.num_key_value_heads * config.head_dim
-        self.q_proj = Linear(width, inner, bias=False)
-        self.k_proj = Linear(width, shared, bias=False)
-        self.v_proj = Linear(width, shared, bias=False)
+        self.qkv_proj = Linear(width, inner + 2 * shared, bias=False)
         self.o_proj = Linear(inner, width, bias=False)
 
     def __call__(
@@ -71,22 +72,28 @@ class Attention(nnx.Module):
         cosines, sines = rotary(positions, config.head_dim, config.rope_theta, x.dtype)
 
         def heads(rows: Array) -> Array:
-            return rows.reshape(batch, count, -1, config.head_dim).transpose(0, 2, 1, 3)
+            rows = rows.reshape(batch, count, -1, config.head_dim).transpose(0, 2, 1, 3)
+            return rows.reshape(-1, count, config.head_dim)
 
-        queries = rotate(heads(self.q_proj(x)), cosines, sines)
-        start = (0, 0, positions[0], 0)
-        keys = lax.dynamic_update_slice(
-            cache[0], rotate(heads(self.k_proj(x)), cosines, sines), start
-        )
-        values = lax.dynamic_update_slice(cache[1], heads(self.v_proj(x)), start)
+        def extended(held: Array, rows: Array) -> Array:
+            return lax.dynamic_update_slice(held, rows, (0, positions[0], 0))
 
-        grouped = queries.reshape(
-            batch, config.num_key_value_heads, -1, count, config.head_dim
-        )  # (B, key heads, group, T, D)
-        scores = jnp.einsum("bkgtd,bkcd->bkgtc", grouped * config.head_dim**-0.5, keys)
-        seen = jnp.arange(keys.shape[2]) <= positions[:, None]
+        inner = config.num_attention_heads * config.head_dim
+        shared = config.num_key_value_heads * config.head_dim
+        queries, keys, values = jnp.split(self.qkv_proj(x), (inner, inner + shared), axis=-1)
+        queries = rotate(heads(queries), cosines, sines)
+        keys = extended(cache[0], rotate(heads(keys), cosines, sines))
+        values = extended(cache[1], heads(values))
+
+        # The heads of a group stand below each other: (B * key heads, group * T, D).
+        queries = queries.reshape(len(keys), -1, config.head_dim) * config.head_dim**-0.5
+        scores = jnp.einsum("kqd,kcd->kqc", queries, keys)
+        seen = jnp.arange(keys.shape[1]) <= positions[:, None]
+        seen = jnp.tile(seen, (queries.shape[1] // count, 1))
         weights = jax.nn.softmax(jnp.where(seen, scores, -jnp.inf), axis=-1)
-        mixed = jnp.einsum("bkgtc,bkcd->btkgd", weights, values).reshape(batch, count, -1)
+        mixed = jnp.einsum("kqc,kcd->kqd", weights, values)
+        mixed = mixed.reshape(batch, -1, count, config.head_dim).transpose(0, 2, 1, 3)
+        mixed = mixed.reshape(batch, count, -1)
         return self.o_proj(mixed), (keys, values)
 
 
@@ -95,12 +102,12 @@ class FeedForward(nnx.Module):
 
     def __init__(self, config: LlamaConfig):
         width, inner = config.hidden_size, config.intermediate_size
-        self.gate_proj = Linear(width, inner, bias=False)
-        self.up_proj = Linear(width, inner, bias=False)
+        self.gate_up_proj = Linear(width, 2 * inner, bias=False)
         self.down_proj = Linear(inner, width, bias=False)
 
     def __call__(self, x: Array) -> Array:
-        return self.down_proj(jax.nn.silu(self.gate_proj(x)) * self.up_proj(x))
+        gate, up = jnp.split(self.gate_up_proj(x), 2, axis=-1)
+        return self.down_proj(jax.nn.silu(gate) * up)
 
 
 class Block(nnx.Module):
@@ -142,7 +149,10 @@ class Decoder(nnx.Module):
 
 
 class Llama(nnx.Module):
-    """The network with its output layer, which may be the table of embeddings again."""
+    """The network with its output layer, which may be the table of embeddings again.
+
+    Filled from a checkpoint's `JoinedArrays(arrays, JOINED)`.
+    """
 
     def __init__(self, config: LlamaConfig):
         self.config = config
@@ -153,7 +163,7 @@ class Llama(nnx.Module):
     def empty_cache(self, capacity: int, batch: int = 1, dtype: jnp.dtype = jnp.float32) -> Cache:
         """Room for `capacity` tokens."""
         config = self.config
-        shape = (batch, config.num_key_value_heads, capacity, config.head_dim)
+        shape = (batch * config.num_key_value_heads, capacity, config.head_dim)
         return tuple(
             (jnp.zeros(shape, dtype), jnp.zeros(shape, dtype))
             for _ in range(config.num_hidden_layers)

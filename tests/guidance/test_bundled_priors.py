@@ -1,15 +1,10 @@
 """The shipped priors know what they are told: measured on variants of objects they never saw."""
 
-import sys
-from pathlib import Path
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from flax import nnx
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from experiments.priors.data.pictures import pictures
 from experiments.priors.data.prepare import surface_points

@@ -13,15 +13,16 @@ from safetensors.numpy import save_file
 from experiments.parity.arrays import weights
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.language_model import LanguageModel, Message, Sampling
-from jaxphys.networks.llama import Llama
+from jaxphys.networks.joined import JoinedArrays
+from jaxphys.networks.llama import JOINED, Llama
 from jaxphys.networks.llama_config import LlamaConfig
 from jaxphys.networks.parameters import fill
 from jaxphys.weights.gguf_file import read_gguf
 from jaxphys.weights.gguf_tokenizer import tokenizer_from_gguf
-from tests.networks.published import wanted
+from tests.networks.published import of_llama
 from tests.weights.gguf_files import CONFIG, MARKS, TOKENS, write_gguf
 
-ARRAYS = weights(wanted(lambda: Llama(LlamaConfig.from_json(CONFIG, "tiny"))))
+ARRAYS = weights(of_llama(LlamaConfig.from_json(CONFIG, "tiny")))
 ASKED = [Message("system", "be brief"), Message("user", "a red inn")]
 
 
@@ -67,7 +68,8 @@ def test_what_a_user_writes_never_becomes_a_mark(model):
 
 def test_the_answer_is_the_likeliest_token_time_after_time(model, tokenizer):
     config = LlamaConfig.from_json(CONFIG, "tiny")
-    network = fill(lambda: Llama(config), ARRAYS, source="tiny")
+    arrays = JoinedArrays(ARRAYS, JOINED, source="tiny")
+    network = fill(lambda: Llama(config), arrays, source="tiny")
     read = nnx.jit(lambda ids: network.logits(network(ids, network.empty_cache(128), 0)[0]))
     ids, count = model.conversation(ASKED), 6
     start = len(ids)

@@ -1,12 +1,7 @@
 """The parametric models that the priors learn from, and the pictures made of them."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from experiments.priors.data import splat
 from experiments.priors.data.pictures import pictures

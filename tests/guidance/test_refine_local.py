@@ -11,9 +11,8 @@ from jaxphys.guidance import refine_local
 from jaxphys.guidance.refine import ATTEMPTS, refine
 from jaxphys.guidance.refine_check import words_of
 from jaxphys.guidance.refine_local import conversation, find_local
-from jaxphys.networks.llama import Llama
 from jaxphys.networks.llama_config import LlamaConfig
-from tests.networks.published import wanted
+from tests.networks.published import of_llama
 from tests.weights.gguf_files import CONFIG, write_gguf
 
 LONG = (
@@ -26,7 +25,7 @@ WIDE = CONFIG | {"max_position_embeddings": 4096}
 @pytest.fixture(scope="module")
 def tiny(tmp_path_factory):
     """A random model; its answers are noise."""
-    arrays = weights(wanted(lambda: Llama(LlamaConfig.from_json(CONFIG, "tiny"))))
+    arrays = weights(of_llama(LlamaConfig.from_json(CONFIG, "tiny")))
     return write_gguf(tmp_path_factory.mktemp("model") / "tiny.gguf", arrays, config=WIDE)
 
 
@@ -122,7 +121,7 @@ def test_noise_falls_through(tiny):
 
 
 def test_a_prompt_that_is_too_long_for_the_model(tmp_path):
-    arrays = weights(wanted(lambda: Llama(LlamaConfig.from_json(CONFIG, "tiny"))))
+    arrays = weights(of_llama(LlamaConfig.from_json(CONFIG, "tiny")))
     path = write_gguf(tmp_path / "short.gguf", arrays)
     result = refine("a rose", {"JAXPHYS_LLM_PATH": str(path)})
     (attempt,) = result.attempts

@@ -2,16 +2,12 @@
 
 import json
 import math
-import sys
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from flax import nnx
-
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from experiments.scorer import model, ranking, renders, twelve
 from experiments.scorer.augment import augment

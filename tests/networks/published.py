@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from flax import nnx
 
+from jaxphys.networks.llama_config import LlamaConfig
 from jaxphys.networks.parameters import Renames, named_parameters, published_name, published_shape
 
 HERE = Path(__file__).parent
@@ -30,6 +31,30 @@ def wanted(build: Callable[[], nnx.Module]) -> dict[str, tuple[int, ...]]:
     """Shapes of the arrays that a module asks a checkpoint for, by name."""
     parameters = named_parameters(nnx.eval_shape(build))
     return {published_name(n): published_shape(n, leaf.shape) for n, leaf in parameters.items()}
+
+
+def of_llama(config: LlamaConfig) -> dict[str, tuple[int, ...]]:
+    """Shapes of the arrays in a Llama checkpoint, by name; those of SmolLM2 are a manifest."""
+    width, inner = config.hidden_size, config.num_attention_heads * config.head_dim
+    shared = config.num_key_value_heads * config.head_dim
+    block = {
+        "input_layernorm": (width,),
+        "self_attn.q_proj": (inner, width),
+        "self_attn.k_proj": (shared, width),
+        "self_attn.v_proj": (shared, width),
+        "self_attn.o_proj": (width, inner),
+        "post_attention_layernorm": (width,),
+        "mlp.gate_proj": (config.intermediate_size, width),
+        "mlp.up_proj": (config.intermediate_size, width),
+        "mlp.down_proj": (width, config.intermediate_size),
+    }
+    table = (config.vocab_size, width)
+    layers = {"model.embed_tokens": table, "model.norm": (width,)}
+    for index in range(config.num_hidden_layers):
+        layers |= {f"model.layers.{index}.{name}": shape for name, shape in block.items()}
+    if not config.tie_word_embeddings:
+        layers["lm_head"] = table
+    return {f"{name}.weight": shape for name, shape in layers.items()}
 
 
 def offered(

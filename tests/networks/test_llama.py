@@ -10,10 +10,11 @@ from flax import nnx
 from experiments.parity.arrays import weights
 from experiments.parity.llama_cases import CASES, IDS, READ, SMOLLM2
 from jaxphys.core.errors import InputError
-from jaxphys.networks.llama import Llama
+from jaxphys.networks.joined import JoinedArrays
+from jaxphys.networks.llama import JOINED, Llama
 from jaxphys.networks.llama_config import LlamaConfig
 from jaxphys.networks.parameters import fill
-from tests.networks.published import difference, golden, manifest, wanted
+from tests.networks.published import difference, golden, manifest, of_llama, wanted
 
 GGUF = {  # SmolLM2-135M-Instruct's metadata
     "general.architecture": "llama", "llama.block_count": 30, "llama.context_length": 8192,
@@ -26,8 +27,12 @@ GGUF = {  # SmolLM2-135M-Instruct's metadata
 
 def small(name: str, dtype=jnp.float32, **changes) -> Llama:
     config = dataclasses.replace(LlamaConfig.from_json(CASES[name], name), **changes)
-    arrays = weights(wanted(lambda: Llama(config)))
-    return fill(lambda: Llama(config), arrays, source=name, dtype=dtype)
+    return filled(config, weights(of_llama(config)), dtype)
+
+
+def filled(config: LlamaConfig, arrays: dict[str, np.ndarray], dtype=jnp.float32) -> Llama:
+    joined = JoinedArrays(arrays, JOINED, source="x")
+    return fill(lambda: Llama(config), joined, source="x", dtype=dtype)
 
 
 @nnx.jit
@@ -80,10 +85,13 @@ def test_weights_of_16_bits_are_computed_with_in_32():
 def test_names_are_those_of_the_published_checkpoint():
     config = LlamaConfig.from_json(SMOLLM2, "config.json")
     published = manifest("smollm2_135m_instruct")
-    assert wanted(lambda: Llama(config)) == published
+    assert of_llama(config) == published
     assert sum(np.prod(shape) for shape in published.values()) == 134515008
+    arrays = {name: np.broadcast_to(np.float32(0), shape) for name, shape in published.items()}
+    joined = JoinedArrays(arrays, JOINED, source="x")
+    assert wanted(lambda: Llama(config)) == {name: joined[name].shape for name in joined}
     untied = dataclasses.replace(config, tie_word_embeddings=False)
-    assert wanted(lambda: Llama(untied)).keys() - published.keys() == {"lm_head.weight"}
+    assert wanted(lambda: Llama(untied)).keys() - set(joined) == {"lm_head.weight"}
 
 
 def test_both_formats_say_the_same():
@@ -139,9 +147,9 @@ def test_what_is_not_supported_is_named_of_gguf(changes):
 
 def test_a_checkpoint_of_another_size_is_refused():
     config = LlamaConfig.from_json(CASES["llama_tied"], "tied")
-    arrays = weights(wanted(lambda: Llama(config)))
+    arrays = weights(of_llama(config))
     with pytest.raises(InputError, match=r"x: array 'model\.norm\.bias' belongs to no part"):
-        fill(lambda: Llama(config), arrays | {"model.norm.bias": np.zeros(48)}, source="x")
+        filled(config, arrays | {"model.norm.bias": np.zeros(48)})
     narrow = dataclasses.replace(config, num_key_value_heads=3)
-    with pytest.raises(InputError, match=r"k_proj\.weight' has shape \(16, 48\) instead of"):
-        fill(lambda: Llama(narrow), arrays, source="x")
+    with pytest.raises(InputError, match=r"qkv_proj\.weight' has shape \(80, 48\) instead of"):
+        filled(narrow, arrays)

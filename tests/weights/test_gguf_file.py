@@ -10,14 +10,13 @@ import pytest
 
 from experiments.parity.arrays import weights
 from jaxphys.core.errors import InputError
-from jaxphys.networks.llama import Llama
 from jaxphys.networks.llama_config import LlamaConfig
 from jaxphys.weights.gguf_file import read_gguf
 from jaxphys.weights.gguf_tokenizer import tokenizer_from_gguf
-from tests.networks.published import wanted
+from tests.networks.published import of_llama
 from tests.weights.gguf_files import CONFIG, TOKENS, write_gguf
 
-ARRAYS = weights(wanted(lambda: Llama(LlamaConfig.from_json(CONFIG, "tiny"))))
+ARRAYS = weights(of_llama(LlamaConfig.from_json(CONFIG, "tiny")))
 QUERIES, KEYS = (f"model.layers.1.self_attn.{part}_proj.weight" for part in "qk")
 
 
