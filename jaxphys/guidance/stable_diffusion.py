@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -87,10 +86,8 @@ class StableDiffusionGuide(NamedTuple):
         """See `ImageGuide`. The gradient passes through the encoder, never through the denoiser."""
         encode_key, key = jax.random.split(key)
         keys = jax.random.split(encode_key, images.shape[0])
-        # One picture at a time, its inside computed again for the gradient: the encoder's
-        # activations at 512 x 512 are the largest arrays of all.
-        encode = jax.checkpoint(partial(encode_picture, self.encoder))
-        latents = jax.lax.map(lambda pair: encode(*pair), (images, keys))
+        # One picture at a time: what the encoder computes at 512 x 512 is the largest of all.
+        latents = jax.lax.map(lambda pair: encode_picture(self.encoder, *pair), (images, keys))
         told = TextStates(self.states[view_index(azimuth, elevation)])
         untold = TextStates(jnp.broadcast_to(self.states[-1], told.states.shape))
         return score_distillation(self.prior, latents, told, untold, key, config, progress)

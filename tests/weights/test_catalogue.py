@@ -7,6 +7,8 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.evaluate.aesthetic import HEADS
+from jaxphys.guidance.point_e_guide import BASE, CLIP, UPSAMPLER
+from jaxphys.guidance.stable_diffusion import PARTS
 from jaxphys.weights import manifest
 from jaxphys.weights.catalogue import CATALOGUE, find_entry
 
@@ -67,4 +69,9 @@ def test_the_aesthetic_heads_are_those_that_are_scored_with():
 def test_stable_diffusion_has_every_part():
     for name in ("stable-diffusion-1.5", "stable-diffusion-2.1-base", "stable-diffusion-2.1"):
         parts = {file.path.split("/")[0] for file in CATALOGUE[name].files}
-        assert parts == {"scheduler", "text_encoder", "tokenizer", "unet", "vae"}
+        assert parts == set(PARTS)
+
+
+def test_point_e_s_files_are_those_that_are_loaded():
+    assert [file.path for file in CATALOGUE["point-e"].files] == [f"{BASE}.pt", f"{UPSAMPLER}.pt"]
+    assert CLIP in CATALOGUE
