@@ -33,16 +33,17 @@ def path(name: Name, /) -> int:
     return 0
 
 
-def fetch(name: Name, /) -> int:
+def fetch(name: Name, /, *, half: bool = False) -> int:
     """Fetch what is missing of a network over the network, and print where it is.
 
     Args:
         name: As in the list.
+        half: Fetch half precision where it is published, which is half as much.
     """
     from jaxphys.weights import manifest, weights_path
     from jaxphys.weights.resolve import fetch as run
 
-    print(weights_path(name) if name in manifest() else run(name))
+    print(weights_path(name) if name in manifest() else run(name, half=half))
     return 0
 
 

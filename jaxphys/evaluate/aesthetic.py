@@ -1,8 +1,7 @@
 """How much people like a picture, from 1 to 10: LAION's two heads on CLIP embeddings.
 
-Both are affine. The first is one linear layer (Schuhmann et al. 2022). The second, of
-the same author's "improved" predictor, is five of them with no activation in between, so it folds
-into one.
+Both are affine. The first is one linear layer (Schuhmann et al. 2022). The second, of the same
+author's "improved" predictor, is five of them with no activation in between, so it folds into one.
 """
 
 from __future__ import annotations

@@ -64,20 +64,23 @@ def settings(prior: str, shape_prior: str) -> OptimiseConfig:
     return config
 
 
-def published_folder(given: str, names: Sequence[str], option: str, parts: Sequence[str]) -> Path:
+def published_folder(
+    given: str, names: Sequence[str], option: str, parts: Sequence[str], *, half: bool = False
+) -> Path:
     """Where the files of a published prior are, fetched if they are nowhere yet.
 
     Args:
         given: one of `names`, an alias of one, or a folder.
         option: what `given` answers, for errors.
         parts: files and folders that are needed.
+        half: what is fetched may be of half precision, see `locate`.
 
     Raises:
         InputError: no such name or folder, or files that are missing and cannot be had.
     """
     known = {alias: name for name in names for alias in (name, *CATALOGUE[name].aliases)}
     if given in known:
-        return locate(known[given], parts=parts or None)
+        return locate(known[given], parts=parts or None, half=half)
     if not Path(given).is_dir():
         valid = nearest(given, [BUNDLED, *known])
         raise InputError(f"{option} {given}: is no folder and no name of a prior; {valid}")
@@ -89,22 +92,24 @@ def published_folder(given: str, names: Sequence[str], option: str, parts: Seque
     return Path(given)
 
 
-def require(prior: str, shape_prior: str) -> None:
+def require(prior: str, shape_prior: str, *, dtype: str = "bfloat16") -> None:
     """Raises `InputError` if the weights of the named priors are not at hand and cannot be had,
     before any work is done."""
     if prior == BUNDLED:
         require_prior("pixel_prior")
     else:
-        image_folder(prior)
+        image_folder(prior, dtype=dtype)
     if shape_prior == BUNDLED:
         require_prior("point_prior")
     else:
         shape_folders(shape_prior)
 
 
-def image_folder(prior: str) -> Path:
-    """The folder of a Stable Diffusion, see `published_folder`."""
-    return published_folder(prior, STABLE_DIFFUSION, "prior", stable_diffusion.PARTS)
+def image_folder(prior: str, *, dtype: str = "bfloat16") -> Path:
+    """The folder of a Stable Diffusion, see `published_folder`; for `dtype` of 16 bits, 16 bits
+    are fetched."""
+    half = dtype != "float32"
+    return published_folder(prior, STABLE_DIFFUSION, "prior", stable_diffusion.PARTS, half=half)
 
 
 def image_guide(
@@ -115,7 +120,7 @@ def image_guide(
         return bundled_image_guide(prompt)
     return stable_diffusion.stable_diffusion_guide(
         prompt,
-        image_folder(prior),
+        image_folder(prior, dtype=dtype),
         negative=negative,
         dtype=dtype,
         attention_slice=attention_slice,

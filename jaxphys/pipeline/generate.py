@@ -74,7 +74,7 @@ def generate(
     timing = Timing()
     scene, generation = _asked(prompt, scene, changes)
     validate(scene)
-    choice.require(generation.prior, generation.shape_prior)
+    choice.require(generation.prior, generation.shape_prior, dtype=generation.precision)
     refinement = _refined(generation, Path(out))
     out = run_directory(out)
     write_json(out / "prompt.json", dataclasses.asdict(refinement))

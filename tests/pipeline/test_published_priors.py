@@ -9,7 +9,7 @@ from PIL import Image
 
 from jaxphys.cli.main import run
 from jaxphys.core.errors import InputError
-from jaxphys.guidance.point_e import PointEGuide, PointESampling
+from jaxphys.guidance.point_e import PointESampling, sample_point_e
 from jaxphys.pipeline.generate import generate
 from jaxphys.scene import Domain, Object, Scene
 from tests import checkpoints
@@ -60,7 +60,7 @@ def test_another_checkpoint_makes_another_object(made):
 
 def test_point_e_reaches_a_video(tmp_path, monkeypatch):
     monkeypatch.setenv("JAXPHYS_WEIGHTS", str(tmp_path))
-    monkeypatch.setattr(PointEGuide.sample, "__defaults__", (PointESampling(steps=3),))
+    monkeypatch.setitem(sample_point_e.__kwdefaults__, "config", PointESampling(steps=3))
     checkpoints.point_e_files(tmp_path / "point-e")
     checkpoints.clip(tmp_path / "clip-vit-large-patch14")
     checkpoints.point_e_files(tmp_path / "elsewhere", ".safetensors")

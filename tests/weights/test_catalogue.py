@@ -10,7 +10,7 @@ from jaxphys.evaluate.aesthetic import HEADS
 from jaxphys.guidance.point_e_guide import BASE, CLIP, UPSAMPLER
 from jaxphys.guidance.stable_diffusion import PARTS
 from jaxphys.weights import manifest
-from jaxphys.weights.catalogue import CATALOGUE, find_entry
+from jaxphys.weights.catalogue import CATALOGUE, find_entry, halved
 
 FILES = [
     (entry, file)
@@ -70,6 +70,15 @@ def test_stable_diffusion_has_every_part():
     for name in ("stable-diffusion-1.5", "stable-diffusion-2.1-base", "stable-diffusion-2.1"):
         parts = {file.path.split("/")[0] for file in CATALOGUE[name].files}
         assert parts == set(PARTS)
+
+
+def test_stable_diffusion_is_published_at_half_precision():
+    for name in ("stable-diffusion-1.5", "stable-diffusion-2.1-base", "stable-diffusion-2.1"):
+        entry = CATALOGUE[name]
+        small = halved(entry, entry.files)
+        assert set(entry.half) <= set(small) and len(small) == len(entry.files)
+        sizes = [sum(file.size for file in files) for files in (small, entry.files)]
+        assert sizes[0] < 0.51 * sizes[1]
 
 
 def test_point_e_s_files_are_those_that_are_loaded():

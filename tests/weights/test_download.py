@@ -194,6 +194,23 @@ def test_parts_from_the_hub(monkeypatch, environment, online):
         assert {path.name for path in folder.iterdir()} == {"unet", "vae"}
 
 
+@pytest.mark.parametrize("published", ["net.fp16.safetensors", "net.safetensors"])
+def test_half_precision_where_it_is_published(monkeypatch, environment, online, published):
+    catalogued(
+        monkeypatch,
+        File("a", 1),
+        File("net.safetensors", 2),
+        half=(File("net.fp16.safetensors", 1),),
+        repositories=(REPOSITORY,),
+    )
+    both = {"a": b"1", "net.safetensors": BODY} | {published: BODY}
+    with serving(hub({REPOSITORY: both})) as (address, _):
+        environment["HF_ENDPOINT"] = address
+        folder = locate("net", half=True, environment=environment)
+        assert {path.name for path in folder.iterdir()} == {"a", published}
+        assert fetch("net", environment=environment) == folder  # either will do
+
+
 def test_a_repository_that_lacks_a_file(monkeypatch, environment, online):
     catalogued(monkeypatch, File("a", 1), File("net.pth", 1), repositories=(REPOSITORY,))
     with serving(hub({REPOSITORY: {"a": b"1"}})) as (address, _):
