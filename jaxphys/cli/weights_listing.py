@@ -50,6 +50,7 @@ def listing(environment: Mapping[str, str] = os.environ) -> list[dict]:
 
 
 def as_json(found: Sequence[dict]) -> str:
+    """All of it."""
     return json.dumps(found, indent=2)
 
 

@@ -21,7 +21,7 @@ from flax import nnx
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.language_checkpoint import END_OF_TURN, TURN, Checkpoint, open_checkpoint
 from jaxphys.networks.joined import JoinedArrays
-from jaxphys.networks.llama import JOINED, Block, Cache, Llama
+from jaxphys.networks.llama import JOINED, Block, Cache, Llama, empty_cache
 from jaxphys.networks.parameters import fill
 
 Array = jax.Array
@@ -190,19 +190,13 @@ class LanguageModel:
         if known not in self._read_before:
             padded = np.zeros(_room(len(ids)), np.int32)
             padded[: len(ids)] = ids
-            rows, cache = self._run(padded, self._empty(capacity), 0)
+            cache = empty_cache(self.config, capacity, dtype=self._dtype)
+            rows, cache = self._run(padded, cache, 0)
             latest = list(self._read_before.items())[-1:]
             text = _Text(len(ids), rows[len(ids) - 1], cache)
             self._read_before = dict([*latest, (known, text)])
         text = self._read_before[known]
         return text._replace(cache=jax.tree.map(jnp.copy, text.cache))  # `_run` uses it up
-
-    def _empty(self, capacity: int) -> Cache:
-        config = self.config
-        shape = (config.num_key_value_heads, capacity, config.head_dim)
-        return tuple(
-            (jnp.zeros(shape, self._dtype), jnp.zeros(shape, self._dtype)) for _ in self._blocks
-        )
 
     def answer(
         self,

@@ -23,6 +23,16 @@ Cache = tuple[tuple[Array, Array], ...]
 JOINED = {"qkv_proj": ("q_proj", "k_proj", "v_proj"), "gate_up_proj": ("gate_proj", "up_proj")}
 
 
+def empty_cache(
+    config: LlamaConfig, capacity: int, batch: int = 1, dtype: jnp.dtype = jnp.float32
+) -> Cache:
+    """Room for `capacity` tokens of each of `batch` texts."""
+    shape = (batch * config.num_key_value_heads, capacity, config.head_dim)
+    return tuple(
+        (jnp.zeros(shape, dtype), jnp.zeros(shape, dtype)) for _ in range(config.num_hidden_layers)
+    )
+
+
 class RMSNorm(nnx.Module):
     """x / rms(x) times a scale, over the last axis (Zhang & Sennrich 2019)."""
 
@@ -159,15 +169,6 @@ class Llama(nnx.Module):
         self.model = Decoder(config)
         tied = config.tie_word_embeddings
         self.lm_head = None if tied else Linear(config.hidden_size, config.vocab_size, bias=False)
-
-    def empty_cache(self, capacity: int, batch: int = 1, dtype: jnp.dtype = jnp.float32) -> Cache:
-        """Room for `capacity` tokens."""
-        config = self.config
-        shape = (batch * config.num_key_value_heads, capacity, config.head_dim)
-        return tuple(
-            (jnp.zeros(shape, dtype), jnp.zeros(shape, dtype))
-            for _ in range(config.num_hidden_layers)
-        )
 
     def __call__(self, ids: Array, cache: Cache, start: Array | int) -> tuple[Array, Cache]:
         """Reads tokens on from where the cache ends.

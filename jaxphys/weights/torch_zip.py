@@ -61,6 +61,8 @@ class Global:
 
 
 class Storage(NamedTuple):
+    """A flat run of numbers, as bytes in this computer's order."""
+
     content: bytes
     dtype: np.dtype
 

@@ -14,7 +14,7 @@ from experiments.parity.arrays import weights
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.language_model import LanguageModel, Message, Sampling
 from jaxphys.networks.joined import JoinedArrays
-from jaxphys.networks.llama import JOINED, Llama
+from jaxphys.networks.llama import JOINED, Llama, empty_cache
 from jaxphys.networks.llama_config import LlamaConfig
 from jaxphys.networks.parameters import fill
 from jaxphys.weights.gguf_file import read_gguf
@@ -70,7 +70,7 @@ def test_the_answer_is_the_likeliest_token_time_after_time(model, tokenizer):
     config = LlamaConfig.from_json(CONFIG, "tiny")
     arrays = JoinedArrays(ARRAYS, JOINED, source="tiny")
     network = fill(lambda: Llama(config), arrays, source="tiny")
-    read = nnx.jit(lambda ids: network.logits(network(ids, network.empty_cache(128), 0)[0]))
+    read = nnx.jit(lambda ids: network.logits(network(ids, empty_cache(config, 128), 0)[0]))
     ids, count = model.conversation(ASKED), 6
     start = len(ids)
     for _ in range(count):

@@ -198,16 +198,15 @@ def test_whoever_is_left_waiting_is_hung_up_on(server):
 
 def test_the_time_is_for_all_answers_together(server):
     def slow(handler):
-        time.sleep(0.8)
+        time.sleep(2.0)
         handler.reply(completion("no"))
 
-    server.environment["JAXPHYS_LLM_TIMEOUT"] = "2"
+    server.environment["JAXPHYS_LLM_TIMEOUT"] = "5"
     server.behave = slow
     find_endpoint(server.environment)
-    begin = time.monotonic()
     result = refine("a rose", server.environment)
-    assert time.monotonic() - begin < 4  # not 2 s for each of the answers
-    assert result.attempts[-1].problem == "no answer within 2 s"
+    # With 5 s for each, all three answers would have come.
+    assert result.attempts[-1].problem == "no answer within 5 s"
     assert "has 1 words" in result.attempts[0].problem
 
 

@@ -11,7 +11,7 @@ from experiments.parity.arrays import weights
 from experiments.parity.llama_cases import CASES, IDS, READ, SMOLLM2
 from jaxphys.core.errors import InputError
 from jaxphys.networks.joined import JoinedArrays
-from jaxphys.networks.llama import JOINED, Llama
+from jaxphys.networks.llama import JOINED, Llama, empty_cache
 from jaxphys.networks.llama_config import LlamaConfig
 from jaxphys.networks.parameters import fill
 from tests.networks.published import difference, golden, manifest, of_llama, wanted
@@ -42,7 +42,7 @@ def read(model: Llama, ids, cache, start):
 
 
 def read_at_once(model: Llama, dtype=jnp.float32):
-    return read(model, IDS, model.empty_cache(IDS.shape[1], len(IDS), dtype), 0)[0]
+    return read(model, IDS, empty_cache(model.config, IDS.shape[1], len(IDS), dtype), 0)[0]
 
 
 @pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
@@ -58,7 +58,7 @@ def test_reading_on_from_a_cache_is_reading_at_once(name):
     model = small(name)
     # Padding behind what is read does no harm, nor does room that is never used.
     padded = np.pad(IDS[:, :READ], ((0, 0), (0, 3)), constant_values=17)
-    logits, cache = read(model, padded, model.empty_cache(16, len(IDS)), 0)
+    logits, cache = read(model, padded, empty_cache(model.config, 16, len(IDS)), 0)
     last = [logits[:, READ - 1]]
     for position in range(READ, IDS.shape[1]):
         logits, cache = read(model, IDS[:, position : position + 1], cache, position)
