@@ -5,20 +5,15 @@ solver boundaries by `build`.
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
-from jaxphys.scene.check import NON_NEGATIVE, POSITIVE, between, check_ranges
+from jaxphys.core.fields import NON_NEGATIVE, POSITIVE, Checked, between
 
 Vector = tuple[float, float, float]
 Surface = Literal["sticky", "slip", "separate"]
 FOREVER = 1e9
 
 
-class _Checked:
-    def __post_init__(self):
-        check_ranges(self)
-
-
 @dataclass(frozen=True)
-class Walls(_Checked):
+class Walls(Checked):
     """The six faces of the domain, three cells inside it.
 
     Attributes:
@@ -33,7 +28,7 @@ class Walls(_Checked):
 
 
 @dataclass(frozen=True)
-class Plane(_Checked):
+class Plane(Checked):
     """A half-space that holds matter on the side its normal points to.
 
     Attributes:
@@ -53,7 +48,7 @@ class Plane(_Checked):
 
 
 @dataclass(frozen=True)
-class Box(_Checked):
+class Box(Checked):
     """A box whose inside moves at a given velocity; the box moves along.
 
     Attributes:
@@ -73,7 +68,7 @@ class Box(_Checked):
 
 
 @dataclass(frozen=True)
-class Impulse(_Checked):
+class Impulse(Checked):
     """A push on the particles that start inside a box.
 
     Attributes:
@@ -94,7 +89,7 @@ class Impulse(_Checked):
 
 
 @dataclass(frozen=True)
-class Translate(_Checked):
+class Translate(Checked):
     """The particles that start inside a box move at a given velocity; zero holds them fixed.
 
     Attributes:
@@ -112,7 +107,7 @@ class Translate(_Checked):
 
 
 @dataclass(frozen=True)
-class Rotate(_Checked):
+class Rotate(Checked):
     """The particles that start inside a cylinder turn about its axis and move along it.
 
     Attributes:
@@ -136,7 +131,7 @@ class Rotate(_Checked):
 
 
 @dataclass(frozen=True)
-class Release(_Checked):
+class Release(Checked):
     """Particles are held and let go one after another by a plane that sweeps over them.
 
     Attributes:
@@ -154,7 +149,7 @@ class Release(_Checked):
 
 
 @dataclass(frozen=True)
-class Cut(_Checked):
+class Cut(Checked):
     """A half-space that holds what is in it, but for a layer that slides along it, slowed.
 
     Attributes:

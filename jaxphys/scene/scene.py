@@ -8,19 +8,14 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.fields import NON_NEGATIVE, POSITIVE, Checked, between
 from jaxphys.scene.boundaries import Boundary, Vector
-from jaxphys.scene.check import NON_NEGATIVE, POSITIVE, between, check_ranges
 
 Area = tuple[float, float, float, float, float, float]
 
 
-class _Checked:
-    def __post_init__(self):
-        check_ranges(self)
-
-
 @dataclass(frozen=True)
-class Rotation(_Checked):
+class Rotation(Checked):
     """A turn about an axis.
 
     Attributes:
@@ -33,7 +28,7 @@ class Rotation(_Checked):
 
 
 @dataclass(frozen=True)
-class Region(_Checked):
+class Region(Checked):
     """A box of an object, at rest, with material parameters of its own.
 
     Attributes:
@@ -47,7 +42,7 @@ class Region(_Checked):
 
 
 @dataclass(frozen=True)
-class Filling(_Checked):
+class Filling(Checked):
     """Particles inside a hollow object (see `jaxphys.gaussians.filling`).
 
     Attributes:
@@ -82,7 +77,7 @@ class Filling(_Checked):
 
 
 @dataclass(frozen=True)
-class Object(_Checked):
+class Object(Checked):
     """One thing in the scene.
 
     Attributes:
@@ -119,7 +114,7 @@ class Object(_Checked):
 
 
 @dataclass(frozen=True)
-class Domain(_Checked):
+class Domain(Checked):
     """The box that is simulated.
 
     Attributes:
@@ -151,7 +146,7 @@ class Domain(_Checked):
 
 
 @dataclass(frozen=True)
-class View(_Checked):
+class View(Checked):
     """The camera: it looks at `target` from `distance`, and may move.
 
     Attributes:
@@ -175,7 +170,7 @@ class View(_Checked):
 
 
 @dataclass(frozen=True)
-class Ground(_Checked):
+class Ground(Checked):
     """The floor that is drawn (physics has its own, in `boundaries`).
 
     Attributes:
@@ -190,7 +185,7 @@ class Ground(_Checked):
 
 
 @dataclass(frozen=True)
-class Generation(_Checked):
+class Generation(Checked):
     """How the object of a scene came from a sentence.
 
     Attributes:
@@ -218,7 +213,7 @@ class Generation(_Checked):
 
 
 @dataclass(frozen=True)
-class Scene(_Checked):
+class Scene(Checked):
     """Everything that decides a run: the same scene and objects give the same bytes.
 
     Attributes:

@@ -1,5 +1,5 @@
-"""Ranges of numbers, stated once in the field's metadata and checked wherever a scene comes
-from.
+"""What a declared number may be: its range and unit, stated once in the field's metadata, checked
+wherever the value comes from.
 """
 
 import dataclasses
@@ -42,3 +42,10 @@ def check_ranges(instance: Any) -> None:
                 raise InputError(f"{entry.name}: {number} must be at least {rules['least']}")
             if "most" in rules and not number <= rules["most"]:
                 raise InputError(f"{entry.name}: {number} must be at most {rules['most']}")
+
+
+class Checked:
+    """Base of dataclasses whose numbers are checked as they are made."""
+
+    def __post_init__(self):
+        check_ranges(self)
