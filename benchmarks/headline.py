@@ -30,7 +30,7 @@ def prepare(frames: int, width: int, height: int, splats: int) -> Prepared:
         animate(scene, out, objects=(thing,))
         timing = json.loads((out / "timing.json").read_text())
         extra.update(stages=timing["stages"], compile=timing["compile"])
-        extra["particles"] = build(scene, thing).config.particles
+        extra["particles"] = build(scene, thing).simulation.config.particles
 
     return Prepared(call, work=frames, once=True, extra=extra)
 

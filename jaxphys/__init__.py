@@ -13,18 +13,22 @@ if TYPE_CHECKING:
     from .gaussians.gaussians import Gaussians as Gaussians
     from .mpm.adjoint import Checkpointed as Checkpointed
     from .mpm.adjoint import Plain as Plain
+    from .mpm.frames import rollout_frames as rollout_frames
+    from .mpm.motion import Frame as Frame
+    from .mpm.motion import Motion as Motion
     from .mpm.rollout import SimulationError as SimulationError
+    from .mpm.simulation import Simulation as Simulation
     from .pipeline.animate import animate as animate
     from .pipeline.draw import draw as draw
+    from .pipeline.frames import frames as frames
+    from .pipeline.frames import simulate as simulate
     from .pipeline.generate import generate as generate
-    from .pipeline.rollout import rollout_frames as rollout_frames
-    from .pipeline.simulate import simulate as simulate
     from .render.camera import look_at as look_at
     from .render.camera import orbit as orbit
     from .render.renderer import render as render
-    from .scene.build import Simulation as Simulation
     from .scene.build import build as build
     from .scene.defaults import default_scene as default_scene
+    from .scene.look import Look as Look
     from .scene.read import read_scene as read_scene
     from .scene.scene import Object as Object
     from .scene.scene import Scene as Scene
@@ -35,18 +39,22 @@ _HOMES = {
     "Gaussians": "gaussians.gaussians",
     "Checkpointed": "mpm.adjoint",
     "Plain": "mpm.adjoint",
+    "rollout_frames": "mpm.frames",
+    "Frame": "mpm.motion",
+    "Motion": "mpm.motion",
     "SimulationError": "mpm.rollout",
+    "Simulation": "mpm.simulation",
     "animate": "pipeline.animate",
     "draw": "pipeline.draw",
+    "frames": "pipeline.frames",
+    "simulate": "pipeline.frames",
     "generate": "pipeline.generate",
-    "rollout_frames": "pipeline.rollout",
-    "simulate": "pipeline.simulate",
     "look_at": "render.camera",
     "orbit": "render.camera",
     "render": "render.renderer",
-    "Simulation": "scene.build",
     "build": "scene.build",
     "default_scene": "scene.defaults",
+    "Look": "scene.look",
     "read_scene": "scene.read",
     "Object": "scene.scene",
     "Scene": "scene.scene",

@@ -47,8 +47,14 @@ def lean(step: Callable) -> Callable:
     return jax.checkpoint(step, policy=policy, prevent_cse=False)
 
 
-def repeat(adjoint: Adjoint, body: Callable, carry, length: int):
-    """`carry` after `length` calls of `body(carry) -> carry`."""
+def repeat(adjoint: Adjoint, body: Callable, carry, length):
+    """`carry` after `length` calls of `body(carry) -> carry`.
+
+    A length that is not an int is traced, and then there is no reverse mode.
+
+    """
+    if not isinstance(length, int):
+        return jax.lax.fori_loop(0, length, lambda _, c: body(c), carry)
 
     def run(carry, count):
         return jax.lax.scan(lambda c, _: (body(c), None), carry, length=count)[0]

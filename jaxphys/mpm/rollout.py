@@ -1,15 +1,11 @@
 """Many steps in one compiled program, and what becomes of a simulation that fails."""
 
-from functools import partial
-from typing import NamedTuple
-
 import jax
 import jax.numpy as jnp
-from jax import Array
 
 from jaxphys.core.errors import InputError
 
-from .adjoint import Adjoint, Plain, for_frames, lean, repeat
+from .adjoint import Adjoint, Plain, lean, repeat
 from .state import (
     LEFT_GRID,
     LEFT_WINDOW,
@@ -24,17 +20,6 @@ from .state import (
 from .step import step
 
 PLAIN = Plain()
-
-
-class Frames(NamedTuple):
-    """A rollout's frames in public order. The frame after the first `steps_per_frame` is frame 0.
-
-    position: (T, N, 3) [m]; deformation: (T, N, 3, 3), the total gradient where it is kept.
-    After a failure the last good frame is repeated.
-    """
-
-    position: Array
-    deformation: Array
 
 
 class SimulationError(InputError):
@@ -86,61 +71,16 @@ def check(status: Status, frame: int | None = None) -> None:
 
 
 def rollout(
-    config: Config, model: Model, state: State, *, dt, steps: int, adjoint: Adjoint = PLAIN
+    config: Config, model: Model, state: State, *, dt, steps, adjoint: Adjoint = PLAIN
 ) -> State:
     """The state after `steps` steps of `dt` [s], or `state` with the failure's status if one fails.
 
     Pure and free of host traffic: jit it, differentiate it. The status tells the first failing
-    step and particle; `check` turns it into an exception.
+    step and particle; `check` turns it into an exception. `steps` may be traced, so that one
+    program serves any number of them; then there is no reverse mode.
     """
     end = repeat(adjoint, lean(lambda s: step(config, model, s, dt)), state, steps)
     return _keep_good(state, end)
-
-
-def rollout_frames(
-    config: Config,
-    model: Model,
-    state: State,
-    *,
-    dt,
-    steps_per_frame: int,
-    frames: int,
-    adjoint: Adjoint = PLAIN,
-) -> tuple[State, Frames]:
-    """The last good state and the frames of `frames` times `steps_per_frame` steps of `dt` [s]."""
-    inner, again = for_frames(adjoint, frames, steps_per_frame)
-
-    def advance(state):
-        return rollout(config, model, state, dt=dt, steps=steps_per_frame, adjoint=inner)
-
-    if again:
-        advance = jax.checkpoint(advance, prevent_cse=False)
-
-    def body(state, _):
-        state = advance(state)
-        return state, Frames(*public_arrays(state))
-
-    return jax.lax.scan(body, state, length=frames)
-
-
-def public_arrays(state: State) -> tuple[Array, Array]:
-    """Positions (N, 3) [m] and total deformation gradients (N, 3, 3)."""
-    gradient = state.deformation if state.total is None else state.total
-    return jnp.moveaxis(state.position, -1, 0), jnp.moveaxis(gradient, -1, 0)
-
-
-def frame_step(config: Config, steps: int, adjoint: Adjoint = PLAIN):
-    """A compiled `(model, state, dt) -> state` of `steps` steps, for callers who report progress.
-
-    The state given is consumed (its memory is reused). After a failure the state of the last good
-    frame comes back with the failure's status.
-    """
-
-    @partial(jax.jit, donate_argnums=(1,))
-    def advance(model: Model, state: State, dt) -> State:
-        return rollout(config, model, state, dt=dt, steps=steps, adjoint=adjoint)
-
-    return advance
 
 
 def _keep_good(before: State, after: State) -> State:

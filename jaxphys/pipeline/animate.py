@@ -4,23 +4,25 @@ import dataclasses
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import jax
-import numpy as np
 
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.gaussians.ply import write_ply
 from jaxphys.mpm.rollout import SimulationError
+from jaxphys.mpm.simulation import Simulation
 from jaxphys.pipeline.draw import deformed_gaussians
 from jaxphys.pipeline.film import Artist, film
+from jaxphys.pipeline.interrupt import deferred_interrupt
 from jaxphys.pipeline.output import Timing, run_directory, write_lines
+from jaxphys.pipeline.record import Record, recorded
 from jaxphys.pipeline.resume import Checkpoint, fingerprint
-from jaxphys.pipeline.simulate import Record, save_record, simulate
-from jaxphys.pipeline.video import ContactSheet, write_picture
-from jaxphys.scene.build import Simulation, build, validate
+from jaxphys.pipeline.video import write_picture
+from jaxphys.scene.build import build, validate
 from jaxphys.scene.json import to_json, write_scene
+from jaxphys.scene.look import Look
 from jaxphys.scene.scene import Scene
 from jaxphys.scene.source import load_object
 
@@ -73,33 +75,51 @@ def animate(
                 for i, thing in enumerate(scene.objects)
             )
     with timing.stage("build"):
-        simulation = build(scene, *objects)
+        simulation, look = build(scene, *objects)
     out = run_directory(out)
     scene = _write_inputs(out, scene, objects)
     checkpoint = Checkpoint(out, _identity(scene, simulation))
-    watch_simulation = None if watch is None else lambda frame: watch("simulate", frame)
-    try:
-        with timing.stage("simulate"):
-            record = simulate(
-                simulation,
-                scene.frames,
-                checkpoint=checkpoint,
+    record = Record()
+    with deferred_interrupt() as interrupted:
+        frames = recorded(
+            simulation,
+            scene.frames,
+            record,
+            checkpoint,
+            interrupted=interrupted,
+            timing=timing,
+            progress=progress,
+            watch=_named(watch, "simulate"),
+        )
+        aside = out / f".motion.{os.getpid()}.mp4"
+        try:
+            sheet = film(
+                aside,
+                scene,
+                look,
+                frames,
+                interrupted=interrupted,
                 timing=timing,
                 progress=progress,
-                watch=watch_simulation,
+                watch=_named(watch, "render"),
             )
-    except SimulationError as error:
-        _save_last_good(out, scene, simulation, error.record, timing)
-        raise
+            os.replace(aside, out / "motion.mp4")
+        except SimulationError:
+            _save_last_good(out, scene, look, record, timing)
+            raise
+        except KeyboardInterrupt:
+            record.save(checkpoint)
+            if aside.exists():
+                os.replace(aside, out / "motion.partial.mp4")
+            raise
+        finally:
+            aside.unlink(missing_ok=True)
+    sheet.write(out / "contact_sheet.png")
     write_lines(out / "metrics.jsonl", record.metrics)
-    with timing.stage("render"):
-        finished = _film(out, scene, simulation, record, timing, progress, watch)
-    if not finished:
-        save_record(checkpoint, simulation, record)
-        raise KeyboardInterrupt
     if save_splats:
         with timing.stage("splats"):
-            _save_splats(out / "splats", simulation, record)
+            for index, frame in enumerate(record.frames):
+                write_ply(out / "splats" / f"{index:04d}.ply", deformed_gaussians(look, frame))
     checkpoint.remove()
     timing.write(out / "timing.json")
     return out
@@ -127,54 +147,16 @@ def _write_inputs(out: Path, scene: Scene, objects: tuple[Gaussians, ...]) -> Sc
     return scene
 
 
-def _pictures(artist: Artist, record: Record) -> Iterator[np.ndarray]:
-    for index, (position, gradient) in enumerate(
-        zip(record.positions, record.deformations, strict=True)
-    ):
-        yield artist.draw(index, position, gradient)
+def _named(watch: Watch | None, stage: str) -> Callable[[int], None] | None:
+    return None if watch is None else lambda frame: watch(stage, frame)
 
 
-def _film(
-    out: Path,
-    scene: Scene,
-    simulation: Simulation,
-    record: Record,
-    timing: Timing,
-    progress: bool,
-    watch: Watch | None,
-) -> bool:
-    artist = Artist(scene, simulation, record.positions, timing)
-    artist.prepare(record.positions, record.deformations)
-    sheet = ContactSheet(scene.frames)
-    watch_pictures = None if watch is None else lambda frame: watch("render", frame)
-    aside = out / f".motion.{os.getpid()}.mp4"
-    try:
-        pictures = _pictures(artist, record)
-        finished = film(aside, scene, pictures, sheet, progress=progress, watch=watch_pictures)
-        os.replace(aside, out / ("motion.mp4" if finished else "motion.partial.mp4"))
-    finally:
-        aside.unlink(missing_ok=True)
-    if not finished:
-        return False
-    sheet.write(out / "contact_sheet.png")
-    return True
-
-
-def _save_last_good(
-    out: Path, scene: Scene, simulation: Simulation, record: Record, timing: Timing
-) -> None:
+def _save_last_good(out: Path, scene: Scene, look: Look, record: Record, timing: Timing) -> None:
+    """The frame before a failure, as Gaussians and as a picture."""
     write_lines(out / "metrics.jsonl", record.metrics)
-    position, gradient = record.positions[-1], record.deformations[-1]
-    write_ply(out / "last_good.ply", deformed_gaussians(simulation, position, gradient))
-    artist = Artist(scene, simulation, record.positions, timing)
-    artist.prepare(record.positions[-1:], record.deformations[-1:])
-    last = len(record.positions) - 1
-    write_picture(out / "last_good.png", artist.draw(last, position, gradient))
-
-
-def _save_splats(directory: Path, simulation: Simulation, record: Record) -> None:
-    for index, (position, gradient) in enumerate(
-        zip(record.positions, record.deformations, strict=True)
-    ):
-        moved = deformed_gaussians(simulation, position, gradient)
-        write_ply(directory / f"{index:04d}.ply", moved)
+    last = len(record.frames) - 1
+    if last < 0:
+        return
+    write_ply(out / "last_good.ply", deformed_gaussians(look, record.frames[last]))
+    artist = Artist(scene, look, record.frames, timing)
+    write_picture(out / "last_good.png", artist.paint(last, record.frames[last]))

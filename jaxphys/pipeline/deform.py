@@ -4,7 +4,8 @@ A Gaussian at X with covariance S becomes one at phi(X) with covariance F S F^T,
 the deformation map linearised at X; its colour is looked up along the view direction turned back by
 the rotation R of F = R U (Xie et al. 2024, PhysGaussian).
 
-The first n particles carry the n Gaussians; those after them only fill the inside.
+Who carries which Gaussian is the motion's to know (`mpm.motion.Frame.carried`): here the i-th
+position is that of the i-th Gaussian.
 """
 
 from dataclasses import dataclass
@@ -63,12 +64,11 @@ def to_world(similarity: Similarity, positions: Array, deformation: Array) -> tu
 def _carried(gaussians: Gaussians, positions, deformation, similarity) -> tuple[Array, Array]:
     """World positions (n, 3) and gradients (3, 3, n) of the particles that carry Gaussians."""
     count = gaussians.count
-    if positions.shape[0] < count or deformation.shape[0] < count:
+    if positions.shape != (count, 3) or deformation.shape != (count, 3, 3):
         raise InputError(
-            f"{count} Gaussians on {positions.shape[0]} positions and {deformation.shape[0]} "
-            f"deformation gradients: give at least one particle each, Gaussians first"
+            f"{count} Gaussians on positions {positions.shape} and deformation gradients "
+            f"{deformation.shape}: give one of each for every Gaussian (Frame.carried)"
         )
-    positions, deformation = positions[:count], deformation[:count]
     if similarity is not None:
         positions, deformation = to_world(similarity, positions, deformation)
     return positions, jnp.moveaxis(deformation, 0, -1)
@@ -88,14 +88,14 @@ def deform(
 
     Args:
         gaussians: at rest, n of them, in the world.
-        positions: where the particles are now [m], (N, 3), N >= n; the first n carry Gaussians.
-        deformation: total deformation gradients, (N, 3, 3).
+        positions: where the Gaussians' particles are now [m], (n, 3).
+        deformation: their total deformation gradients, (n, 3, 3).
         camera_position: (3,) [m], in the world.
         similarity: the frame of `positions` and `deformation`, if it is not the world's.
         colours: the range to regularise colours by; none: colours as they are.
 
     Raises:
-        InputError: fewer particles than Gaussians.
+        InputError: not one position and one deformation gradient for each Gaussian.
     """
     means, F = _carried(gaussians, positions, deformation, similarity)
     # (F A)(F A)^T rather than F (A A^T) F^T: symmetric and positive by construction.

@@ -1,5 +1,5 @@
-"""A frame of a simulation as an image: particles move Gaussians, Gaussians become splats,
-splats pixels.
+"""A frame of a motion as an image: particles move Gaussians, Gaussians become splats, splats
+pixels.
 """
 
 import jax
@@ -9,44 +9,45 @@ from jax import Array
 from jaxphys.core.splats import Splats
 from jaxphys.gaussians.colour import regularise
 from jaxphys.gaussians.gaussians import Gaussians, concatenate, to_splats
+from jaxphys.mpm.motion import Frame
 from jaxphys.pipeline.deform import bake, deform
 from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import Image, render
 from jaxphys.render.settings import Settings
-from jaxphys.scene.build import Simulation
+from jaxphys.scene.look import Look
 
 SETTINGS = Settings()
 
 
-def frame_splats(
-    simulation: Simulation, positions: Array, deformations: Array, eye: Array
-) -> Splats:
+def frame_splats(look: Look, frame: Frame, eye: Array) -> Splats:
     """What is drawn of one frame.
 
     Args:
-        simulation: whose Gaussians move.
-        positions, deformations: of the particles that carry them, (K, 3) [m] and (K, 3, 3).
+        look: whose Gaussians move.
+        frame: where their particles are.
         eye: where the camera stands (3,) [m].
+
+    Raises:
+        InputError: the frame carries another number of points than the look has Gaussians.
+        SimulationError: the simulation had failed by then.
     """
-    splats = deform(simulation.gaussians, positions, deformations, eye)
-    if simulation.colours is not None:
+    frame.check()
+    splats = deform(look.gaussians, *frame.carried(), eye)
+    if look.colours is not None:
         parts = [
             regularise(splats.colours[start:stop], limits)
-            for (start, stop), limits in zip(
-                simulation.scene_objects, simulation.colours, strict=True
-            )
+            for (start, stop), limits in zip(look.objects, look.colours, strict=True)
         ]
         splats = splats._replace(colours=jnp.concatenate(parts))
-    if simulation.still is not None:
-        rest = to_splats(simulation.still, eye)
+    if look.still is not None:
+        rest = to_splats(look.still, eye)
         splats = jax.tree.map(lambda *both: jnp.concatenate(both), splats, rest)
     return splats
 
 
 def draw(
-    simulation: Simulation,
-    positions: Array,
-    deformations: Array,
+    look: Look,
+    frame: Frame,
     camera: Camera,
     *,
     background=1.0,
@@ -55,20 +56,26 @@ def draw(
 ) -> Image:
     """One frame as an image; differentiable.
 
+    Inside jit, where a failure cannot be raised, the picture of a failed frame is NaN.
+
     Args:
-        simulation: whose Gaussians move.
-        positions, deformations: either of the particles that carry Gaussians, (K, 3) [m] and
-            (K, 3, 3), or of all particles, (N, 3) and (N, 3, 3), as `rollout_frames` gives them.
+        look: whose Gaussians move.
+        frame: of a motion, such as `motion[-1]`.
         camera, background, settings, capacity: as in `jaxphys.render.render`.
+
+    Raises:
+        InputError: the frame carries another number of points than the look has Gaussians.
+        SimulationError: the simulation had failed by then.
     """
-    if positions.shape[0] != simulation.gaussians.count:
-        positions = positions[simulation.particles]
-        deformations = deformations[simulation.particles]
-    splats = frame_splats(simulation, positions, deformations, position(camera))
-    return render(splats, camera, background=background, settings=settings, capacity=capacity)
+    splats = frame_splats(look, frame, position(camera))
+    image = render(splats, camera, background=background, settings=settings, capacity=capacity)
+    # What is not a number is not drawn: without this a failure would be an empty picture.
+    sound = jnp.where(frame.status.code == 0, 1, jnp.nan).astype(image.colour.dtype)
+    return image._replace(colour=image.colour * sound)
 
 
-def deformed_gaussians(simulation: Simulation, positions: Array, deformations: Array) -> Gaussians:
-    """One frame as Gaussians that can be written to a file."""
-    moved = bake(simulation.gaussians, positions, deformations)
-    return moved if simulation.still is None else concatenate([moved, simulation.still])
+def deformed_gaussians(look: Look, frame: Frame) -> Gaussians:
+    """One frame as Gaussians that can be written to a file. Raises as `frame_splats` does."""
+    frame.check()
+    moved = bake(look.gaussians, *frame.carried())
+    return moved if look.still is None else concatenate([moved, look.still])

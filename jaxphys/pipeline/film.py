@@ -1,7 +1,7 @@
 """Frames of a motion as pictures, and as a video."""
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 
@@ -11,22 +11,22 @@ import numpy as np
 from jax import Array
 from tqdm import tqdm
 
+from jaxphys.mpm.motion import Frame
 from jaxphys.pipeline.backdrop import backdrop
 from jaxphys.pipeline.draw import draw, frame_splats
 from jaxphys.pipeline.framing import frame_cameras
-from jaxphys.pipeline.interrupt import deferred_interrupt
 from jaxphys.pipeline.output import Timing
 from jaxphys.pipeline.video import ContactSheet, VideoWriter
 from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import next_capacity, required_pairs
-from jaxphys.scene.build import Simulation
-from jaxphys.scene.scene import Scene
+from jaxphys.scene.look import Look
+from jaxphys.scene.scene import Scene, View
 
 ROOM = 1.15  # capacity over what the frames looked at need
 
 
 @dataclass(frozen=True)
-class Look:
+class Surroundings:
     """What surrounds the object in pictures; static."""
 
     background: tuple[float, float, float]
@@ -35,110 +35,111 @@ class Look:
     shadow: float = 0.0
 
 
-def look_of(scene: Scene) -> Look:
+def surroundings_of(scene: Scene) -> Surroundings:
     """The surroundings that a scene asks for."""
     ground = scene.ground
     if ground is None:
-        return Look(scene.background)
-    return Look(scene.background, ground.height, ground.colour, ground.shadow)
+        return Surroundings(scene.background)
+    return Surroundings(scene.background, ground.height, ground.colour, ground.shadow)
 
 
-@partial(jax.jit, static_argnames=("look", "capacity"))
+@partial(jax.jit, static_argnames=("surroundings", "capacity"))
 def picture(
-    simulation: Simulation,
-    positions: Array,
-    deformations: Array,
+    look: Look,
+    frame: Frame,
     camera: Camera,
     middle: Array,
     extent: Array,
     *,
-    look: Look,
+    surroundings: Surroundings,
     capacity: int,
 ) -> tuple[Array, Array]:
     """A frame as bytes (H, W, 3) uint8, and how many pairs of tile and splat it needs.
 
     Args:
-        simulation: whose Gaussians are drawn.
-        positions, deformations: of the particles that carry them, (K, 3) [m] and (K, 3, 3).
+        look: whose Gaussians are drawn.
+        frame: where they are.
         camera: where from.
         middle, extent: where the floor fades, see `backdrop`.
-        look: surroundings.
+        surroundings: of the object.
         capacity: pairs to make room for.
     """
-    behind = jnp.array(look.background, positions.dtype)
-    if look.floor is not None:
+    behind = jnp.array(surroundings.background, frame.position.dtype)
+    if surroundings.floor is not None:
         behind = backdrop(
             camera,
-            positions,
+            frame.carried()[0],
             middle,
             extent,
-            height=look.floor,
-            colour=look.floor_colour,
-            shadow=look.shadow,
-            background=look.background,
+            height=surroundings.floor,
+            colour=surroundings.floor_colour,
+            shadow=surroundings.shadow,
+            background=surroundings.background,
         )
-    image = draw(simulation, positions, deformations, camera, background=behind, capacity=capacity)
+    image = draw(look, frame, camera, background=behind, capacity=capacity)
     return jnp.round(255 * jnp.clip(image.colour, 0, 1)).astype(jnp.uint8), image.required
 
 
 @jax.jit
-def _needed(simulation: Simulation, positions: Array, deformations: Array, camera: Camera) -> Array:
+def _needed(look: Look, frame: Frame, camera: Camera) -> Array:
     """Pairs of tile and splat of one frame."""
-    splats = frame_splats(simulation, positions, deformations, position(camera))
-    return required_pairs(splats, camera)
+    return required_pairs(frame_splats(look, frame, position(camera)), camera)
+
+
+def needs_whole_motion(view: View) -> bool:
+    """Whether the camera can only be placed once the whole motion is known."""
+    return view.distance is None or view.target is None
 
 
 class Artist:
-    """Draws frames of one scene; compiles once, and again only where a frame needs more room."""
+    """Draws frames of one scene; compiles once, and again only where a frame needs more room.
 
-    def __init__(
-        self, scene: Scene, simulation: Simulation, points: list[np.ndarray], timing: Timing
-    ):
-        self._simulation, self._timing, self._look = simulation, timing, look_of(scene)
-        still = simulation.still
-        shown = list(points)
-        if still is not None:
-            shown[0] = np.concatenate([shown[0], np.asarray(still.means)])
+    Args:
+        scene: size of the pictures, camera and surroundings.
+        look: what is drawn.
+        frames: those that the camera must show and that room is made for: all of them, or where the
+            camera stands by itself (`needs_whole_motion`) the first one.
+        timing: gets the seconds of compiling.
+    """
+
+    def __init__(self, scene: Scene, look: Look, frames: list[Frame], timing: Timing):
+        self._look, self._timing = look, timing
+        self._surroundings = surroundings_of(scene)
+        shown = [np.asarray(frame.carried()[0]) for frame in frames]
+        low, high = shown[0].min(axis=0), shown[0].max(axis=0)
+        if look.still is not None:
+            shown[0] = np.concatenate([shown[0], np.asarray(look.still.means)])
+        if not needs_whole_motion(scene.camera):
+            shown = shown[:1] * scene.frames
         self.cameras = frame_cameras(scene.camera, shown, scene.fps, scene.width, scene.height)
-        first = points[0]
-        low, high = first.min(axis=0), first.max(axis=0)
         self._middle = jnp.asarray((low + high)[:2] / 2)
-        self._extent = jnp.asarray(max(1.2 * float(np.max(high - low)), 1e-3), jnp.float32)
-        self._capacity = 0
+        self._extent = jnp.asarray(max(1.2 * float(np.max(high - low)), 1e-3), shown[0].dtype)
         self._programs: dict[int, Callable] = {}
+        last = len(frames) - 1
+        with timing.compiling("render"):
+            needed = [int(_needed(look, frames[i], self.cameras[i])) for i in {0, last // 2, last}]
+        self._capacity = next_capacity(int(ROOM * max(needed)))
 
-    def _run(self, place, deformation, camera):
-        arguments = (self._simulation, place, deformation, camera, self._middle, self._extent)
+    def _run(self, frame: Frame, camera: Camera) -> tuple[Array, Array]:
+        arguments = (self._look, frame, camera, self._middle, self._extent)
         program = self._programs.get(self._capacity)
         if program is None:
             with self._timing.compiling("render"):
                 program = picture.lower(
-                    *arguments, look=self._look, capacity=self._capacity
+                    *arguments, surroundings=self._surroundings, capacity=self._capacity
                 ).compile()
             self._programs[self._capacity] = program
         return program(*arguments)
 
-    def prepare(self, record_positions: list, record_deformations: list) -> None:
-        """Makes room for the first, the middle and the last frame, so that one program does."""
-        last = len(record_positions) - 1
-        with self._timing.compiling("render"):
-            needed = [
-                int(
-                    _needed(
-                        self._simulation,
-                        record_positions[i],
-                        record_deformations[i],
-                        self.cameras[i],
-                    )
-                )
-                for i in sorted({0, last // 2, last})
-            ]
-        self._capacity = next_capacity(int(ROOM * max(needed)))
+    def paint(self, index: int, frame: Frame) -> np.ndarray:
+        """Frame `index` as (H, W, 3) uint8.
 
-    def draw(self, index: int, place: np.ndarray, deformation: np.ndarray) -> np.ndarray:
-        """Frame `index` as (H, W, 3) uint8."""
+        Raises:
+            SimulationError: the simulation had failed by then.
+        """
+        frame.check(index)
         while True:
-            pixels, required = self._run(place, deformation, self.cameras[index])
+            pixels, required = self._run(frame, self.cameras[index])
             if int(required) <= self._capacity:
                 return np.asarray(pixels)
             self._capacity = next_capacity(int(required))
@@ -147,31 +148,47 @@ class Artist:
 def film(
     path: str | os.PathLike,
     scene: Scene,
-    pictures: Iterator[np.ndarray],
-    sheet: ContactSheet,
+    look: Look,
+    frames: Iterable[Frame],
     *,
-    progress: bool,
+    interrupted: Callable[[], bool],
+    timing: Timing,
+    progress: bool = False,
     watch: Callable[[int], None] | None = None,
-) -> bool:
-    """Encodes pictures as they come; returns whether all of them were, or an interrupt came first.
+) -> ContactSheet:
+    """Draws and encodes frames as they come; returns a contact sheet of them.
 
-    Either way the file is whole.
+    Nothing waits for the last frame but a camera that must show the whole motion.
+
+    Args:
+        path: of the video, written in place; whole whatever happens.
+        scene: what surrounds the object, and the camera.
+        look: what is drawn.
+        frames: of the scene, all of them, one after the other.
+        interrupted: whether to stop after the present picture.
+        timing: gets the seconds.
+        progress: whether to show a bar with the time left.
+        watch: called with the number of each picture; may raise KeyboardInterrupt.
+
+    Raises:
+        KeyboardInterrupt: a stop was asked for, here or by what gives the frames.
     """
+    if needs_whole_motion(scene.camera):
+        frames = list(frames)
+    sheet, artist = ContactSheet(scene.frames), None
     bar = tqdm(total=scene.frames, desc="render", unit="frame", disable=not progress)
-    with (
-        bar,
-        deferred_interrupt() as interrupted,
-        VideoWriter(path, scene.width, scene.height, scene.fps) as writer,
-    ):
-        for index, pixels in enumerate(pictures):
-            writer.add(pixels)
-            sheet.add(index, pixels)
+    with bar, VideoWriter(path, scene.width, scene.height, scene.fps) as writer:
+        for index, frame in enumerate(frames):
+            with timing.stage("render"):
+                if artist is None:
+                    known = frames if isinstance(frames, list) else [frame]
+                    artist = Artist(scene, look, known, timing)
+                pixels = artist.paint(index, frame)
+                writer.add(pixels)
+                sheet.add(index, pixels)
             bar.update()
-            try:
-                if watch:
-                    watch(index)
-            except KeyboardInterrupt:
-                return False
+            if watch:
+                watch(index)
             if interrupted():
-                return False
-    return True
+                raise KeyboardInterrupt
+    return sheet

@@ -19,8 +19,8 @@ from jaxphys.guidance.refine import Refinement, check_prompt, refine
 from jaxphys.pipeline.animate import Watch, animate
 from jaxphys.pipeline.interrupt import deferred_interrupt
 from jaxphys.pipeline.output import Timing, run_directory
+from jaxphys.pipeline.record import SAVE_EVERY
 from jaxphys.pipeline.resume import FOLDER, Checkpoint, fingerprint
-from jaxphys.pipeline.simulate import SAVE_EVERY
 from jaxphys.scene.build import validate
 from jaxphys.scene.scene import Generation, Scene
 

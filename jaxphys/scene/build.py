@@ -1,130 +1,59 @@
-"""From a scene and Gaussians to what the solver runs, and which particle carries which
-Gaussian.
+"""From a scene and Gaussians to what the solver runs and what is drawn of it.
+
+Five steps, each a function: objects are put in their places, become particles, particles become a
+model and a state, these get a time step, and the Gaussians become a look.
 """
 
-from dataclasses import dataclass, replace
-from functools import partial
-from itertools import pairwise
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
 from jaxphys.core.errors import InputError
-from jaxphys.gaussians.colour import ColourRange, colour_range, to_unit_interval
 from jaxphys.gaussians.filling import particle_volumes
-from jaxphys.gaussians.gaussians import Gaussians, concatenate
+from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.materials import assemble_parameters, get_material, material_values
+from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.sorting import cell_order, inverse_order
 from jaxphys.mpm.state import Config, Model, State, initial_state
-from jaxphys.mpm.time_step import StepBounds
+from jaxphys.mpm.substep import choose_substep
+from jaxphys.scene.look import Look, look_of
 from jaxphys.scene.place import Placed, place
 from jaxphys.scene.scene import Object, Scene
 from jaxphys.scene.solver_boundaries import solver_boundaries
-from jaxphys.scene.substep import choose_substep
 
 
-@partial(
-    jax.tree_util.register_dataclass,
-    data_fields=("model", "state", "gaussians", "still", "particles", "colours"),
-    meta_fields=("config", "scene_objects", "dt", "steps", "breaks"),
-)
-@dataclass(frozen=True)
-class Simulation:
-    """All that a motion is made of. A pytree: what a gradient may reach is data, the rest static.
+class Built(NamedTuple):
+    """A scene ready to run: `simulation, look = build(scene, gaussians)`.
 
     Attributes:
-        model, state: what the solver runs; the state at time 0.
-        gaussians: K Gaussians that move, at rest.
-        still: Gaussians that are drawn but do not move, or None.
-        particles: which particle carries each Gaussian, int32 (K,).
-        colours: the range of colours of each object, None where they are left as they are.
-        config: the solver's program.
-        scene_objects: (start, stop) of each object's Gaussians.
-        dt: time step [s].
-        steps: time steps a frame.
-        breaks: whether pieces are worth counting.
+        simulation: the physics; knows no Gaussians.
+        look: what is drawn; knows no particles.
     """
 
-    model: Model
-    state: State
-    gaussians: Gaussians
-    still: Gaussians | None
-    particles: Array
-    colours: tuple[ColourRange, ...] | None
-    config: Config
-    scene_objects: tuple[tuple[int, int], ...]
-    dt: float
-    steps: int
-    breaks: bool
-
-    def with_(self, *, velocity=None, **parameters) -> "Simulation":
-        """The same simulation with other numbers, which may be traced and differentiated.
-
-        Args:
-            velocity: of every particle at the start [m/s], (3,) or (N, 3).
-            parameters: of the materials, such as `youngs_modulus`: a number or (N,).
-
-        Raises:
-            InputError: a parameter that no material of the simulation has.
-        """
-        model, state = self.model, self.state
-        for name in parameters:
-            if name not in model.parameters:
-                names = ", ".join(sorted(model.parameters))
-                raise InputError(f"with_: no material here has {name!r}; valid: {names}")
-        changed = {
-            name: jnp.broadcast_to(jnp.asarray(value, model.mass.dtype), model.mass.shape)
-            for name, value in parameters.items()
-        }
-        model = replace(model, parameters=model.parameters | changed)
-        if velocity is not None:
-            velocity = jnp.asarray(velocity, state.velocity.dtype)
-            columns = velocity[:, None] if velocity.ndim == 1 else velocity.T
-            state = state._replace(velocity=jnp.broadcast_to(columns, state.velocity.shape))
-        return replace(self, model=model, state=state)
+    simulation: Simulation
+    look: Look
 
 
-class Part:
-    """One object on its way to particles: positions in solver order, and what belongs to each."""
+@dataclass(frozen=True)
+class Particles:
+    """The matter of one object, in the object's order: its Gaussians, then what fills it.
 
-    def __init__(self, placed: Placed, thing: Object, grid: Grid, where: str):
-        count = placed.moving.count
-        points = np.concatenate([np.asarray(placed.moving.means), placed.filling])
-        order = cell_order(points, grid)
-        self.thing, self.where = thing, where
-        self.positions = points[order]
-        self.carriers = inverse_order(order)[:count]
-        self.volumes = particle_volumes(self.positions, grid.spacing)
+    Attributes:
+        positions: (N, 3) [m]; volumes: (N,) [m^3].
+        velocities: (N, 3) [m/s] and velocity_gradients: (N, 3, 3) [1/s], at the start.
+        values: of the material's parameters, by name, numbers or (N,).
+        carriers: how many of them, from the first on, carry a Gaussian each.
+    """
 
-    def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """Initial velocity (N, 3) and its gradient (N, 3, 3) from `velocity` and `spin`."""
-        x, y, z = np.asarray(self.thing.spin, np.float64)
-        gradient = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        arms = self.positions - np.asarray(self.thing.centre)
-        velocity = np.asarray(self.thing.velocity) + arms @ gradient.T
-        return velocity, np.broadcast_to(gradient, (len(arms), 3, 3))
-
-    def values(self) -> dict[str, Any]:
-        """Material parameters, numbers or (N,), regions applied."""
-        material = get_material(self.thing.material)
-        try:
-            values = material_values(material, self.thing.parameters)
-        except InputError as error:
-            raise InputError(f"{self.where}.parameters: {error}") from None
-        for i, region in enumerate(self.thing.regions):
-            offset = np.abs(self.positions - np.asarray(region.centre))
-            inside = np.all(offset < np.asarray(region.half_size), axis=1)
-            try:
-                material_values(material, region.parameters)
-            except InputError as error:
-                raise InputError(f"{self.where}.regions[{i}].parameters: {error}") from None
-            for name, value in region.parameters.items():
-                values[name] = np.where(inside, value, values[name])
-        return values
+    positions: np.ndarray
+    volumes: np.ndarray
+    velocities: np.ndarray
+    velocity_gradients: np.ndarray
+    values: dict[str, Any]
+    carriers: int
 
 
 def validate(scene: Scene) -> None:
@@ -157,81 +86,135 @@ def solver_grid(scene: Scene) -> Grid:
     return Grid(scene.domain.shape, scene.domain.spacing)
 
 
+def place_objects(scene: Scene, objects: tuple[Gaussians, ...]) -> tuple[Placed, ...]:
+    """Every object in its place, and filled.
+
+    Raises:
+        InputError: not one set of Gaussians for each object, or one that cannot be placed.
+    """
+    if len(objects) != len(scene.objects):
+        raise InputError(
+            f"build: {len(objects)} sets of Gaussians for {len(scene.objects)} objects"
+        )
+    grid = solver_grid(scene)
+    return tuple(
+        place(gaussians, thing, grid, f"objects[{i}]", scene.seed + i)
+        for i, (gaussians, thing) in enumerate(zip(objects, scene.objects, strict=True))
+    )
+
+
+def particles_of(placed: Placed, thing: Object, grid: Grid) -> Particles:
+    """The particles of an object that is in its place."""
+    positions = np.concatenate([np.asarray(placed.moving.means), placed.filling])
+    x, y, z = np.asarray(thing.spin, np.float64)
+    gradient = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    arms = positions - np.asarray(thing.centre)
+    values = material_values(get_material(thing.material), thing.parameters)
+    for region in thing.regions:
+        offset = np.abs(positions - np.asarray(region.centre))
+        inside = np.all(offset < np.asarray(region.half_size), axis=1)
+        for name, value in region.parameters.items():
+            values[name] = np.where(inside, value, values[name])
+    return Particles(
+        positions=positions,
+        volumes=particle_volumes(positions, grid.spacing),
+        velocities=np.asarray(thing.velocity) + arms @ gradient.T,
+        velocity_gradients=np.broadcast_to(gradient, (len(positions), 3, 3)),
+        values=values,
+        carriers=placed.moving.count,
+    )
+
+
+def arrangement_of(parts: list[Particles], grid: Grid) -> np.ndarray:
+    """Which particle, in the objects' order, the solver keeps at each of its places (N,)."""
+    starts = np.cumsum([0, *(len(part.positions) for part in parts)])
+    orders = [cell_order(part.positions, grid) for part in parts]
+    return np.concatenate([start + order for start, order in zip(starts, orders, strict=False)])
+
+
+def solver_parts(
+    scene: Scene, parts: list[Particles], arrangement: np.ndarray, dtype
+) -> tuple[Config, Model, State]:
+    """Program, numbers and start for the solver, in the solver's order."""
+    grid = solver_grid(scene)
+    described = [
+        (get_material(thing.material), part.values, len(part.positions))
+        for thing, part in zip(scene.objects, parts, strict=True)
+    ]
+    parameters, density, segments = assemble_parameters(described, dtype)
+    config = Config(grid, segments, track_total=scene.splats_follow == "total")
+
+    def gathered(name: str) -> np.ndarray:
+        return np.concatenate([getattr(part, name) for part in parts])[arrangement]
+
+    positions = gathered("positions")
+    state = initial_state(
+        config,
+        jnp.asarray(positions, dtype),
+        velocity=gathered("velocities"),
+        affine=gathered("velocity_gradients"),
+    )
+    volume = jnp.asarray(gathered("volumes"), dtype)
+    boundaries, rest = solver_boundaries(scene, grid, positions)
+    model = Model(
+        mass=density[arrangement] * volume,
+        volume=volume,
+        parameters={name: value[arrangement] for name, value in parameters.items()},
+        # Gravity of zero is left out of the program.
+        gravity=jnp.asarray(scene.gravity, dtype),
+        boundaries=boundaries,
+        rest=jnp.asarray(positions.T, dtype) if rest else None,
+    )
+    return config, model, state
+
+
 def build(
-    scene: Scene, *objects: Gaussians, placed: tuple[Placed, ...] | None = None
-) -> Simulation:
-    """The simulation of a scene with these Gaussians, one set for each object.
+    scene: Scene,
+    *objects: Gaussians,
+    placed: tuple[Placed, ...] | None = None,
+    dtype: Any = None,
+) -> Built:
+    """The simulation and the look of a scene with these Gaussians, one set for each object.
 
     Args:
         scene: what is asked for.
         objects: Gaussians as files hold them; they are placed and filled.
         placed: objects that are placed and filled already, in place of `objects`.
+        dtype: of the simulation, float32 or float64; None: JAX's own, float64 where
+            `jax_enable_x64` is set.
 
     Raises:
         InputError: naming the object or field that cannot be simulated.
     """
-    simulation, _ = build_with_bounds(scene, *objects, placed=placed)
-    return simulation
-
-
-def build_with_bounds(
-    scene: Scene, *objects: Gaussians, placed: tuple[Placed, ...] | None = None
-) -> tuple[Simulation, StepBounds]:
-    """As `build`, and the bounds from which the time step was taken."""
     validate(scene)
+    dtype = jnp.zeros((), float if dtype is None else dtype).dtype
+    placed = place_objects(scene, objects) if placed is None else placed
     grid = solver_grid(scene)
-    if placed is None:
-        if len(objects) != len(scene.objects):
-            raise InputError(
-                f"build: {len(objects)} sets of Gaussians for {len(scene.objects)} objects"
-            )
-        placed = tuple(
-            place(gaussians, thing, grid, f"objects[{i}]", scene.seed + i)
-            for i, (gaussians, thing) in enumerate(zip(objects, scene.objects, strict=True))
-        )
     parts = [
-        Part(one, thing, grid, f"objects[{i}]")
-        for i, (one, thing) in enumerate(zip(placed, scene.objects, strict=True))
+        particles_of(one, thing, grid) for one, thing in zip(placed, scene.objects, strict=True)
     ]
-    described = [(get_material(p.thing.material), p.values(), len(p.positions)) for p in parts]
-    parameters, density, segments = assemble_parameters(described)
-    config = Config(grid, segments, track_total=scene.splats_follow == "total")
-    positions = np.concatenate([part.positions for part in parts]).astype(np.float32)
-    motions = [part.motion() for part in parts]
-    state = initial_state(
+    arrangement = arrangement_of(parts, grid)
+    config, model, state = solver_parts(scene, parts, arrangement, dtype)
+    dt, steps, _ = choose_substep(
         config,
-        jnp.asarray(positions),
-        velocity=np.concatenate([velocity for velocity, _ in motions]),
-        affine=np.concatenate([gradient for _, gradient in motions]),
+        model,
+        state,
+        scene.seconds_per_frame,
+        scene.substep,
+        unsafe=scene.unsafe_substep,
     )
-    volume = jnp.asarray(np.concatenate([part.volumes for part in parts]), jnp.float32)
-    boundaries, rest = solver_boundaries(scene, grid, positions)
-    model = Model(
-        mass=density * volume,
-        volume=volume,
-        parameters=parameters,
-        gravity=jnp.asarray(scene.gravity, jnp.float32),
-        boundaries=boundaries,
-        rest=jnp.asarray(positions.T) if rest else None,
-    )
-    dt, steps, bounds = choose_substep(scene, config, model, state)
-    starts = np.cumsum([0, *(len(part.positions) for part in parts)])
-    carriers = [part.carriers + start for part, start in zip(parts, starts[:-1], strict=True)]
-    edges = np.cumsum([0, *(one.moving.count for one in placed)]).tolist()
-    still = [one.still for one in placed if one.still.count]
-    # The paper's range would also stretch the contrast of colours that are right already.
-    ranges = tuple(to_unit_interval(colour_range(one.moving)) for one in placed)
+    starts = np.cumsum([0, *(len(part.positions) for part in parts)])[:-1]
+    carriers = [start + np.arange(part.carriers) for start, part in zip(starts, parts, strict=True)]
     simulation = Simulation(
         model=model,
         state=state,
-        gaussians=concatenate([one.moving for one in placed]),
-        still=concatenate(still) if still else None,
-        particles=jnp.asarray(np.concatenate(carriers), jnp.int32),
-        colours=ranges if scene.regularise_colours else None,
+        order=jnp.asarray(inverse_order(arrangement), jnp.int32),
+        carriers=jnp.asarray(np.concatenate(carriers), jnp.int32),
         config=config,
-        scene_objects=tuple(pairwise(edges)),
+        counts=tuple(len(part.positions) for part in parts),
         dt=dt,
         steps=steps,
-        breaks=any(law.name == "fracture" for law, _, _ in segments),
+        given_substep=scene.substep,
+        unsafe=scene.unsafe_substep,
     )
-    return simulation, bounds
+    return Built(simulation, look_of(placed, scene.regularise_colours))

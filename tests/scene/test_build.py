@@ -5,8 +5,8 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import covariances, from_points
+from jaxphys.mpm.frames import rollout_frames
 from jaxphys.pipeline.draw import draw
-from jaxphys.pipeline.rollout import rollout_frames
 from jaxphys.render.camera import orbit
 from jaxphys.scene import Domain, Object, Region, Rotation, Scene
 from jaxphys.scene.build import build
@@ -27,29 +27,29 @@ def scene(**changes):
 
 def carried(simulation):
     """Positions of the particles that carry Gaussians, in the order of the Gaussians."""
-    return np.asarray(simulation.state.position).T[np.asarray(simulation.particles)]
+    return np.asarray(simulation.frame(simulation.state).carried()[0])
 
 
 def test_every_gaussian_sits_on_its_particle():
-    simulation = build(scene(), GAUSSIANS)
-    assert np.array_equal(carried(simulation), np.asarray(simulation.gaussians.means))
+    simulation, look = build(scene(), GAUSSIANS)
+    assert np.array_equal(carried(simulation), np.asarray(look.gaussians.means))
     # Same object, scaled by 0.1 about its middle.
     offsets = carried(simulation) - 0.5
     assert np.allclose(offsets, 0.1 * (POINTS - (POINTS.min(0) + POINTS.max(0)) / 2), atol=1e-6)
-    ratio = np.asarray(covariances(simulation.gaussians)) / 0.01
+    ratio = np.asarray(covariances(look.gaussians)) / 0.01
     assert np.allclose(ratio, np.asarray(covariances(GAUSSIANS)), atol=1e-6)
 
 
 def test_turns_come_in_order():
     x, z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-    turned = build(scene(rotation=(Rotation(z, 90.0), Rotation(x, 90.0))), GAUSSIANS)
+    turned, _ = build(scene(rotation=(Rotation(z, 90.0), Rotation(x, 90.0))), GAUSSIANS)
     # The long axis goes from x to y by the first turn, from y to z by the second.
     reach = np.ptp(carried(turned), axis=0)
     assert np.argmax(reach) == 2 and reach[2] == pytest.approx(0.4, rel=1e-4)
 
 
 def test_velocity_and_spin():
-    simulation = build(scene(velocity=(1.0, 0.0, 0.0), spin=(0.0, 0.0, 2.0)), GAUSSIANS)
+    simulation, look = build(scene(velocity=(1.0, 0.0, 0.0), spin=(0.0, 0.0, 2.0)), GAUSSIANS)
     position, velocity = (
         np.asarray(simulation.state.position),
         np.asarray(simulation.state.velocity),
@@ -62,30 +62,30 @@ def test_velocity_and_spin():
 
 def test_regions_have_parameters_of_their_own():
     right = Region((0.75, 0.5, 0.5), (0.25, 1.0, 1.0), {"youngs_modulus": 3e3})
-    simulation = build(scene(regions=(right,)), GAUSSIANS)
+    simulation, look = build(scene(regions=(right,)), GAUSSIANS)
     inside = np.asarray(simulation.state.position)[0] > 0.5
     found = np.asarray(simulation.model.parameters["youngs_modulus"])
     assert np.allclose(found, np.where(inside, 3e3, 1e3))
 
 
 def test_only_what_is_inside_the_area_moves():
-    simulation = build(scene(area=(-3.0, 0.0, -3.0, 3.0, -3.0, 3.0)), GAUSSIANS)
-    assert simulation.gaussians.count + simulation.still.count == 60
-    assert simulation.gaussians.count == (POINTS[:, 0] < 0).sum()
+    simulation, look = build(scene(area=(-3.0, 0.0, -3.0, 3.0, -3.0, 3.0)), GAUSSIANS)
+    assert look.gaussians.count + look.still.count == 60
+    assert look.gaussians.count == (POINTS[:, 0] < 0).sum()
 
 
 def test_substep_divides_the_frame():
-    simulation = build(scene(), GAUSSIANS)
+    simulation, look = build(scene(), GAUSSIANS)
     assert simulation.steps * simulation.dt == pytest.approx(0.01)
 
 
 def test_unknown_parameter_of_with():
     with pytest.raises(InputError, match="youngs_modulus"):
-        build(scene(), GAUSSIANS).with_(young=3.0)
+        build(scene(), GAUSSIANS).simulation.with_(young=3.0)
 
 
 def test_gradient_of_a_pixel_loss_is_the_central_difference():
-    simulation = build(scene(velocity=(0.0, 0.0, -1.0), spin=(3.0, 0.0, 0.0)), GAUSSIANS)
+    simulation, look = build(scene(velocity=(0.0, 0.0, -1.0), spin=(3.0, 0.0, 0.0)), GAUSSIANS)
     simulation = jax.tree.map(
         lambda leaf: leaf.astype(jnp.float64) if leaf.dtype == jnp.float32 else leaf, simulation
     )
@@ -94,8 +94,8 @@ def test_gradient_of_a_pixel_loss_is_the_central_difference():
     @jax.jit
     def loss(youngs_modulus, velocity):
         changed = simulation.with_(youngs_modulus=youngs_modulus, velocity=velocity)
-        motion = rollout_frames(changed, 2)
-        image = draw(changed, motion.position[-1], motion.deformation[-1], camera, capacity=4096)
+        motion = rollout_frames(changed, 3)
+        image = draw(look, motion[-1], camera, capacity=4096)
         return jnp.mean((image.colour - 0.3) ** 2)
 
     young, velocity = 1e3, jnp.array([0.0, 0.3, -1.0])

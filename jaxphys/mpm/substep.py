@@ -1,0 +1,49 @@
+"""The time step of a simulation: as large as the bounds allow, a whole number of them to a frame."""
+
+import math
+
+from jaxphys.core.errors import InputError
+from jaxphys.mpm.state import Config, Model, State
+from jaxphys.mpm.time_step import StepBounds, largest_stable_dt, validate_dt
+
+# The bounds hold for the initial state; an object that is pressed together gets stiffer.
+SAFETY = 0.75
+MOST_STEPS = 1_000_000
+
+
+def choose_substep(
+    config: Config,
+    model: Model,
+    state: State,
+    frame_time: float,
+    substep: float | None = None,
+    *,
+    unsafe: bool = False,
+) -> tuple[float, int, StepBounds]:
+    """The time step [s], steps a frame, and the bounds.
+
+    Args:
+        config, model, state: what is stepped, all numbers concrete.
+        frame_time: between frames [s].
+        substep: at most so long [s]; None: as long as the bounds allow.
+        unsafe: take `substep` beyond the bounds.
+
+    Raises:
+        InputError: `substep` breaks the bounds and is not declared unsafe; the message gives the
+            largest safe one.
+    """
+    bounds = largest_stable_dt(config, model, state)
+    wanted = SAFETY * bounds.dt
+    if substep is not None:
+        wanted = substep
+        try:
+            validate_dt(wanted, bounds, unsafe=unsafe)
+        except InputError as error:
+            raise InputError(f"substep: {error}, or set unsafe_substep") from None
+    if frame_time / wanted > MOST_STEPS:
+        raise InputError(
+            f"substep: {wanted:.3g} s makes {frame_time / wanted:.3g} steps a frame, more than "
+            f"{MOST_STEPS}; use a coarser grid or a softer or denser material"
+        )
+    steps = max(1, math.ceil(frame_time / wanted - 1e-9))
+    return frame_time / steps, steps, bounds

@@ -1,0 +1,156 @@
+"""The one loop over frames on the host: whoever looks at a motion as it goes takes it from here.
+
+    for moment in islice(frames(simulation), 48): ...
+
+Film, checkpoint, metrics and whoever comes after consume the same iterator.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jaxphys.mpm.fracture import number_of_pieces
+from jaxphys.mpm.frames import frame_step
+from jaxphys.mpm.motion import Frame, Motion, join
+from jaxphys.mpm.rollout import check
+from jaxphys.mpm.simulation import Simulation
+from jaxphys.mpm.state import OK, State
+from jaxphys.pipeline.output import Timing
+
+# How often a frame that fails is tried again with half the time step.
+REFINEMENTS = 5
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A frame as it is reached.
+
+    Attributes:
+        number: of the frame, 0 for the initial state.
+        state: all that the solver needs to go on, on the device.
+        frame: what is seen of it, on the host.
+        metrics: sums over all particles, ready for JSON.
+    """
+
+    number: int
+    state: State
+    frame: Frame
+    metrics: dict
+
+
+@jax.jit
+def _look(simulation: Simulation, state: State, particles: Array | None):
+    """What is seen of one state, and sums over all particles."""
+    mass, velocity = simulation.model.mass, state.velocity
+    total = jnp.sum(mass)
+    sums = {
+        "mass": total,
+        "centre_of_mass": jnp.sum(mass * state.position, axis=1) / total,
+        "momentum": jnp.sum(mass * velocity, axis=1),
+        "kinetic_energy": 0.5 * jnp.sum(mass * jnp.sum(velocity**2, axis=0)),
+        "lowest": jnp.min(state.position, axis=1),
+        "highest": jnp.max(state.position, axis=1),
+        "fastest": jnp.sqrt(jnp.max(jnp.sum(velocity**2, axis=0))),
+    }
+    return simulation.frame(state, particles), sums
+
+
+def _rounded(value: np.ndarray):
+    """A float32 as the shortest decimal that reads back to it."""
+    if value.ndim:
+        return [_rounded(part) for part in value]
+    return float(str(np.float32(value)))
+
+
+def _moment(simulation: Simulation, state: State, number: int, particles: Array | None) -> Moment:
+    frame, sums = jax.device_get(_look(simulation, state, particles))
+    row = {"frame": number, "time": _rounded(frame.time), "steps": int(frame.status.taken)}
+    row |= {name: _rounded(np.asarray(value)) for name, value in sums.items()}
+    if any(law.name == "fracture" for law, _, _ in simulation.config.segments):
+        row["pieces"] = number_of_pieces(
+            np.asarray(state.position).T, 1.1 * simulation.config.grid.spacing, minimum_size=20
+        )
+    return Moment(number, state, frame, row)
+
+
+def frames(
+    simulation: Simulation,
+    *,
+    start: tuple[int, State] | None = None,
+    particles: Array | None = None,
+    timing: Timing | None = None,
+) -> Iterator[Moment]:
+    """Frame after frame without end; take as many as are wanted.
+
+    A frame that fails is tried again from its start with half the time step, five times at most,
+    unless the time step was asked for. The frames before it stay as they are, and the next one
+    begins with the simulation's own step again: what a frame is depends on its start alone.
+
+    Args:
+        simulation: from `scene.build`.
+        start: number and state of a frame to go on after; None: the first moment is frame 0.
+        particles: those that frames hold, see `Simulation.frame`; None: all.
+        timing: gets the seconds, those of compiling apart.
+
+    Raises:
+        SimulationError: names frame, particle and remedy; every moment before it was good.
+    """
+    timing = timing or Timing()
+    if start is None:
+        start = 0, simulation.state
+        check(simulation.state.status, 0)
+        yield _moment(simulation, simulation.state, 0, particles)
+    number, state = start
+    # The state belongs to the caller, but a compiled frame consumes what it is given.
+    state = jax.tree.map(jnp.array, state)
+    dtype = state.position.dtype
+
+    def arguments(refinement: int):
+        steps = simulation.steps * 2**refinement
+        return jnp.asarray(simulation.frame_time / steps, dtype), jnp.asarray(steps, jnp.int32)
+
+    with timing.stage("simulate"), timing.compiling("simulate"):
+        advance = (
+            frame_step(simulation.config).lower(simulation.model, state, *arguments(0)).compile()
+        )
+    refinements = 0 if simulation.given_substep is not None else REFINEMENTS
+    while True:
+        number += 1
+        with timing.stage("simulate"):
+            sound = state.status
+            for refinement in range(refinements + 1):
+                taken = state.status.taken
+                state = advance(
+                    simulation.model,
+                    state._replace(status=jax.tree.map(jnp.array, sound)._replace(taken=taken)),
+                    *arguments(refinement),
+                )
+                if int(state.status.code) == OK:
+                    break
+            check(state.status, number)
+            moment = _moment(simulation, state, number, particles)
+        yield moment
+        # A consumer may keep the moment's state; the next frame consumes its own copy.
+        state = jax.tree.map(jnp.array, state)
+
+
+def simulate(simulation: Simulation, count: int, *, particles: Array | None = None) -> Motion:
+    """The motion of a simulation on the host, `count` frames long, the first one its initial state.
+
+    As `rollout_frames`, without gradients: frames come one by one, and one that fails is tried
+    again with smaller steps.
+
+    Args:
+        simulation: from `scene.build`.
+        count: number of frames.
+        particles: those that frames hold, see `Simulation.frame`; None: all.
+
+    Raises:
+        SimulationError: names frame, particle and remedy.
+    """
+    return join([moment.frame for moment in islice(frames(simulation, particles=particles), count)])

@@ -1,0 +1,53 @@
+"""What is drawn of a scene: Gaussians, which of them move, and the range of their colours."""
+
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+
+import jax
+import numpy as np
+
+from jaxphys.gaussians.colour import ColourRange, colour_range, to_unit_interval
+from jaxphys.gaussians.gaussians import Gaussians, concatenate
+from jaxphys.scene.place import Placed
+
+
+@partial(
+    jax.tree_util.register_dataclass,
+    data_fields=("gaussians", "still", "colours"),
+    meta_fields=("counts",),
+)
+@dataclass(frozen=True)
+class Look:
+    """The Gaussians of a scene. A pytree. It knows no particles: a `Frame` of the motion says where
+    each Gaussian is.
+
+    Attributes:
+        gaussians: K Gaussians that move, at rest, object after object.
+        still: Gaussians that are drawn but do not move, or None.
+        colours: the range of colours of each object, None where they are left as they are.
+        counts: moving Gaussians of each object.
+    """
+
+    gaussians: Gaussians
+    still: Gaussians | None
+    colours: tuple[ColourRange, ...] | None
+    counts: tuple[int, ...]
+
+    @property
+    def objects(self) -> tuple[tuple[int, int], ...]:
+        """(start, stop) of each object's moving Gaussians."""
+        return tuple(pairwise(np.cumsum([0, *self.counts]).tolist()))
+
+
+def look_of(placed: tuple[Placed, ...], regularise_colours: bool) -> Look:
+    """The look of objects that are in their places."""
+    still = [one.still for one in placed if one.still.count]
+    # The paper's range would also stretch the contrast of colours that are right already.
+    ranges = tuple(to_unit_interval(colour_range(one.moving)) for one in placed)
+    return Look(
+        gaussians=concatenate([one.moving for one in placed]),
+        still=concatenate(still) if still else None,
+        colours=ranges if regularise_colours else None,
+        counts=tuple(one.moving.count for one in placed),
+    )
