@@ -16,7 +16,6 @@ from .motion import Motion as Motion
 from .particle_boundaries import ParticleBoundary as ParticleBoundary
 from .rollout import SimulationError as SimulationError
 from .rollout import check as check
-from .rollout import rollout as rollout
 from .simulation import Simulation as Simulation
 from .sorting import cell_order as cell_order
 from .sorting import inverse_order as inverse_order

@@ -1,7 +1,5 @@
 """From a simulation to its motion: as one differentiable program, or frame by frame."""
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 
@@ -64,11 +62,11 @@ def rollout_frames(simulation: Simulation, frames: int, *, adjoint: Adjoint = PL
 def frame_step(config: Config):
     """A compiled `(model, state, dt, steps) -> state`, for callers who look at every frame.
 
-    The state given is consumed (its memory is reused). `steps` is a number, not a part of the
-    program. After a failure the state of the last good frame comes back with the failure's status.
+    `steps` is a number, not a part of the program. After a failure the state of the last good frame
+    comes back with the failure's status.
     """
 
-    @partial(jax.jit, donate_argnums=(1,))
+    @jax.jit
     def advance(model: Model, state: State, dt, steps) -> State:
         return rollout(config, model, state, dt=dt, steps=steps)
 

@@ -134,9 +134,7 @@ class Simulation:
         value = jnp.asarray(value, self.model.mass.dtype)
         count = self.config.particles
         if value.shape not in ((), (count,)):
-            raise InputError(
-                f"with_: {name} has shape {value.shape}; give one number or ({count},)"
-            )
+            raise InputError(f"with_: {name} has shape {value.shape}; give a number or ({count},)")
         return jnp.broadcast_to(value, (count,)) if value.ndim == 0 else self._sorted(value)
 
     def _sorted(self, value: Array) -> Array:

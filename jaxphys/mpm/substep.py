@@ -1,4 +1,4 @@
-"""The time step of a simulation: as large as the bounds allow, a whole number of them to a frame."""
+"""The time step: as large as the bounds allow, a whole number of them to a frame."""
 
 import math
 

@@ -106,8 +106,6 @@ def frames(
         check(simulation.state.status, 0)
         yield _moment(simulation, simulation.state, 0, particles)
     number, state = start
-    # The state belongs to the caller, but a compiled frame consumes what it is given.
-    state = jax.tree.map(jnp.array, state)
     dtype = state.position.dtype
 
     def arguments(refinement: int):
@@ -122,21 +120,14 @@ def frames(
     while True:
         number += 1
         with timing.stage("simulate"):
-            sound = state.status
+            before = state
             for refinement in range(refinements + 1):
-                taken = state.status.taken
-                state = advance(
-                    simulation.model,
-                    state._replace(status=jax.tree.map(jnp.array, sound)._replace(taken=taken)),
-                    *arguments(refinement),
-                )
+                state = advance(simulation.model, before, *arguments(refinement))
                 if int(state.status.code) == OK:
                     break
             check(state.status, number)
             moment = _moment(simulation, state, number, particles)
         yield moment
-        # A consumer may keep the moment's state; the next frame consumes its own copy.
-        state = jax.tree.map(jnp.array, state)
 
 
 def simulate(simulation: Simulation, count: int, *, particles: Array | None = None) -> Motion:

@@ -5,6 +5,7 @@ import numpy as np
 
 from jaxphys.mpm.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, initial_state
 
 
@@ -32,6 +33,21 @@ def block(count=60, shape=(9, 10, 11), dtype=jnp.float64, seed=0, law=NEO_HOOKEA
         dtype=dtype,
     )
     return config, model, state
+
+
+def simulation_of(config, model, state, *, dt, steps, order=None, carriers=0):
+    """A simulation of one object whose first `carriers` particles carry something."""
+    order = np.arange(config.particles) if order is None else order
+    return Simulation(
+        model,
+        state,
+        jnp.asarray(order, jnp.int32),
+        jnp.arange(carriers, dtype=jnp.int32),
+        config,
+        (config.particles,),
+        dt,
+        steps,
+    )
 
 
 def public(state):

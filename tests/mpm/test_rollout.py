@@ -1,3 +1,4 @@
+from dataclasses import replace
 from functools import partial
 
 import jax
@@ -7,12 +8,13 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm import rollout as rollouts
-from jaxphys.mpm.rollout import SimulationError, check, frame_step, rollout, rollout_frames
+from jaxphys.mpm.frames import frame_step, rollout_frames
+from jaxphys.mpm.rollout import SimulationError, check, rollout
 from jaxphys.mpm.sorting import cell_order, inverse_order
 from jaxphys.mpm.state import LEFT_GRID
 from jaxphys.mpm.step import step
 
-from .cases import block, public
+from .cases import block, public, simulation_of
 
 DT = 1e-3
 
@@ -31,14 +33,16 @@ def test_rollout_is_its_steps():
 
 def test_frames_are_the_states_between():
     config, model, state = block()
-    end, frames = jax.jit(partial(rollout_frames, config, steps_per_frame=3, frames=2))(
-        model, state, dt=DT
-    )
-    middle = jax.jit(partial(rollout, config, steps=3))(model, state, dt=DT)
-    assert frames.position.shape == (2, 60, 3) and frames.deformation.shape == (2, 60, 3, 3)
-    for k, expected in enumerate((middle, end)):
-        np.testing.assert_array_equal(frames.position[k], public(expected)[0])
-        np.testing.assert_array_equal(frames.deformation[k], public(expected)[3])
+    simulation = simulation_of(config, model, state, dt=DT, steps=3)
+    motion = jax.jit(partial(rollout_frames, frames=3))(simulation)
+    run = jax.jit(partial(rollout, config, steps=3))
+    middle = run(model, state, dt=DT)
+    end = run(model, middle, dt=DT)
+    assert motion.position.shape == (3, 60, 3) and motion.deformation.shape == (3, 60, 3, 3)
+    np.testing.assert_allclose(motion.time, [0, 3 * DT, 6 * DT], rtol=1e-12)
+    for k, expected in enumerate((state, middle, end)):
+        np.testing.assert_allclose(motion.position[k], public(expected)[0], atol=1e-14)
+        np.testing.assert_allclose(motion.deformation[k], public(expected)[3], atol=1e-13)
 
 
 def test_one_compilation_and_one_trace_of_the_step(monkeypatch):
@@ -50,23 +54,22 @@ def test_one_compilation_and_one_trace_of_the_step(monkeypatch):
         return step(*arguments)
 
     monkeypatch.setattr(rollouts, "step", counted)
-    run = jax.jit(partial(rollout_frames, config, steps_per_frame=4, frames=3))
-    for dt in (1e-3, 5e-4):
-        state, _ = run(model, state, dt=dt)
+    run = jax.jit(partial(rollout_frames, frames=4))
+    for factor in (1, 2):
+        faster = state._replace(velocity=factor * state.velocity)
+        run(simulation_of(config, model, faster, dt=DT, steps=4))
     assert run._cache_size() == 1
     assert len(traces) == 1
 
 
-def test_frame_step_advances_in_place_and_compiles_once():
+def test_frame_step_compiles_once_for_any_number_of_steps():
     config, model, state = block()
     expected = jax.jit(partial(rollout, config, steps=6))(model, state, dt=DT)
-    advance = frame_step(config, 3)
-    first = state.position
-    for _ in range(2):
-        state = advance(model, state, DT)
+    advance = frame_step(config)
+    for steps in (4, 2):
+        state = advance(model, state, DT, steps)
     assert advance._cache_size() == 1
-    assert first.is_deleted()
-    np.testing.assert_array_equal(state.position, expected.position)
+    np.testing.assert_allclose(state.position, expected.position, atol=1e-14)
     check(state.status, 1)
 
 
@@ -82,10 +85,11 @@ def falling():
     )
 
 
-def test_failure_keeps_the_last_good_frame_and_names_the_first_step():
+def test_failure_keeps_the_last_good_state_and_names_the_first_step():
     config, model, state = falling()
-    run = jax.jit(partial(rollout_frames, config, steps_per_frame=4, frames=3))
-    end, frames = run(model, state, dt=DT)
+    run = jax.jit(partial(rollout, config, steps=4))
+    good = run(model, state, dt=DT)
+    end = run(model, good, dt=DT)
     once = jax.jit(step, static_argnums=0)
     single, history = state, [state]
     while int(single.status.code) == 0:
@@ -93,8 +97,7 @@ def test_failure_keeps_the_last_good_frame_and_names_the_first_step():
         history.append(single)
     failing = len(history) - 2
     assert 4 <= failing < 8, failing
-    np.testing.assert_array_equal(end.position, history[4].position)
-    np.testing.assert_array_equal(frames.position[2], frames.position[0])
+    np.testing.assert_array_equal(end.position, good.position)
     assert [int(x) for x in end.status[:3]] == [int(x) for x in single.status[:3]]
     assert int(end.status.step) == failing and int(end.status.code) == LEFT_GRID
     with pytest.raises(SimulationError, match=r"frame 1, step \d: particle \d+ left the grid") as e:
@@ -103,6 +106,46 @@ def test_failure_keeps_the_last_good_frame_and_names_the_first_step():
     assert isinstance(e.value, InputError)
     with pytest.raises(SimulationError, match="enlarge the domain"):
         check(end.status)
+
+
+def test_frames_after_a_failure_are_not_numbers_and_neither_are_gradients():
+    config, model, state = falling()
+    simulation = simulation_of(config, model, state, dt=DT, steps=4)
+
+    @jax.jit
+    def loss(speed):
+        motion = rollout_frames(replace(simulation, state=state._replace(velocity=speed)), 4)
+        return jnp.sum(motion.position[-1] ** 2), motion
+
+    (value, motion), gradient = jax.value_and_grad(loss, has_aux=True)(state.velocity)
+    assert np.isfinite(motion.position[:2]).all() and np.isnan(motion.position[2:]).all()
+    assert np.isnan(motion.deformation[2:]).all() and np.isnan(value)
+    assert np.isnan(gradient).all()
+    motion[1].check(1)
+    with pytest.raises(SimulationError, match=r"frame 2, step \d: particle \d+ left the grid"):
+        motion.check()
+    # Slow enough, the same program has a gradient.
+    (_, motion), gradient = jax.value_and_grad(loss, has_aux=True)(0.01 * state.velocity)
+    motion.check()
+    assert np.isfinite(gradient).all() and np.any(gradient != 0)
+
+
+def test_a_motion_is_in_the_order_of_the_object():
+    config, model, state = block()
+    order = np.random.default_rng(3).permutation(60)
+    simulation = simulation_of(config, model, state, dt=DT, steps=2, order=order, carriers=7)
+    motion = rollout_frames(simulation, 2)
+    expected = np.asarray(state.position).T[order]
+    np.testing.assert_array_equal(motion.position[0], expected)
+    position, deformation = motion[0].carried()
+    np.testing.assert_array_equal(position, expected[:7])
+    np.testing.assert_array_equal(deformation, np.asarray(public(state)[3])[order[:7]])
+    # Frames that hold the carriers alone say the same.
+    alone = simulation.frame(state, simulation.carriers)
+    assert alone.position.shape == (7, 3)
+    np.testing.assert_array_equal(alone.carried()[0], position)
+    with pytest.raises(IndexError, match="of a motion of 2 frames"):
+        motion[2]
 
 
 def test_two_runs_give_the_same_bytes():

@@ -49,7 +49,7 @@ def test_turns_come_in_order():
 
 
 def test_velocity_and_spin():
-    simulation, look = build(scene(velocity=(1.0, 0.0, 0.0), spin=(0.0, 0.0, 2.0)), GAUSSIANS)
+    simulation, _ = build(scene(velocity=(1.0, 0.0, 0.0), spin=(0.0, 0.0, 2.0)), GAUSSIANS)
     position, velocity = (
         np.asarray(simulation.state.position),
         np.asarray(simulation.state.velocity),
@@ -62,20 +62,20 @@ def test_velocity_and_spin():
 
 def test_regions_have_parameters_of_their_own():
     right = Region((0.75, 0.5, 0.5), (0.25, 1.0, 1.0), {"youngs_modulus": 3e3})
-    simulation, look = build(scene(regions=(right,)), GAUSSIANS)
+    simulation, _ = build(scene(regions=(right,)), GAUSSIANS)
     inside = np.asarray(simulation.state.position)[0] > 0.5
     found = np.asarray(simulation.model.parameters["youngs_modulus"])
     assert np.allclose(found, np.where(inside, 3e3, 1e3))
 
 
 def test_only_what_is_inside_the_area_moves():
-    simulation, look = build(scene(area=(-3.0, 0.0, -3.0, 3.0, -3.0, 3.0)), GAUSSIANS)
+    _, look = build(scene(area=(-3.0, 0.0, -3.0, 3.0, -3.0, 3.0)), GAUSSIANS)
     assert look.gaussians.count + look.still.count == 60
     assert look.gaussians.count == (POINTS[:, 0] < 0).sum()
 
 
 def test_substep_divides_the_frame():
-    simulation, look = build(scene(), GAUSSIANS)
+    simulation, _ = build(scene(), GAUSSIANS)
     assert simulation.steps * simulation.dt == pytest.approx(0.01)
 
 
