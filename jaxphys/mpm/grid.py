@@ -14,7 +14,8 @@ class Grid:
 
     shape: nodes per axis, each at least 3 (a quadratic B-spline touches three).
     spacing: distance between neighbouring nodes [m], positive.
-    Particles must stay where their three nodes per axis exist:
+    The domain is `[0, (shape - 1) * spacing]`, from the first node to the last. Particles
+    must stay where their three nodes per axis exist, half a cell from its ends:
     `0.5 <= x / spacing < shape - 1.5`.
     """
 
@@ -28,6 +29,11 @@ class Grid:
             )
         if not 0 < self.spacing < float("inf"):
             raise InputError(f"Grid.spacing is {self.spacing}: give a positive length in metres.")
+
+    @property
+    def extent(self) -> tuple[float, float, float]:
+        """Coordinates of the last node [m]: the domain's upper ends."""
+        return tuple((n - 1) * self.spacing for n in self.shape)
 
     @property
     def lower(self) -> float:

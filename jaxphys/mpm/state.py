@@ -5,13 +5,24 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError
 
 from .grid import Grid
 
-OK, NOT_FINITE, LEFT_GRID, STEP_TOO_LARGE, LEFT_WINDOW = range(5)
+CODES = 8
+(
+    OK,
+    NOT_FINITE,
+    LEFT_GRID,
+    STEP_TOO_LARGE,
+    LEFT_WINDOW,
+    INVERTED,
+    COLLAPSED,
+    UNSTABLE_STEP,
+) = range(CODES)
 
 
 @dataclass(frozen=True)
@@ -25,12 +36,14 @@ class Config:
     window: nodes per axis of the part of the grid that is computed, or None for all of it. The
         window follows the particles; if they outgrow it, the status says so. A block of particles
         that spans c cells needs c + 3 nodes, and room for what its motion adds.
+    check_step: compare dt with what the state's stiffness allows, at the start of every rollout.
     """
 
     grid: Grid
     segments: tuple[tuple[object, int, int], ...]
     track_total: bool = False
     window: tuple[int, int, int] | None = None
+    check_step: bool = True
 
     def __post_init__(self):
         reached = 0
@@ -78,14 +91,15 @@ class Model:
     """What a gradient may reach and a step does not change. A pytree.
 
     mass: (N,) [kg]; volume: (N,) rest volume [m^3]; parameters: name -> (N,), as the laws name
-    them; gravity: (3,) [m/s^2]; boundaries: grid and particle boundaries, applied in order;
-    rest: (3, N) [m], the positions by which particle boundaries choose, None if there are none.
+    them; gravity: (3,) [m/s^2], or None for none, which no step then adds; boundaries: grid and
+    particle boundaries, applied in order; rest: (3, N) [m], the positions by which particle
+    boundaries choose, None if there are none.
     """
 
     mass: Array
     volume: Array
     parameters: dict[str, Array]
-    gravity: Array
+    gravity: Array | None
     boundaries: tuple = ()
     rest: Array | None = None
 
@@ -93,9 +107,10 @@ class Model:
 class Status(NamedTuple):
     """Whether a simulation is sound, and if not, what failed first. All scalars, int32.
 
-    code: OK, NOT_FINITE, LEFT_GRID, STEP_TOO_LARGE or LEFT_WINDOW; step: steps taken before the
-    one that failed; particle: the lowest index that failed in it; taken: steps taken in all.
-    `step` and `particle` are -1 while code is OK.
+    code: OK, or one of NOT_FINITE, LEFT_GRID, STEP_TOO_LARGE, LEFT_WINDOW, INVERTED, COLLAPSED,
+    UNSTABLE_STEP, which `rollout.check` explains; step: steps taken before the one that failed;
+    particle: the lowest index that failed in it (UNSTABLE_STEP: the one that allows least); taken:
+    steps taken in all. `step` and `particle` are -1 while code is OK.
     """
 
     code: Array
@@ -104,13 +119,28 @@ class Status(NamedTuple):
     taken: Array
 
 
+class Residual(NamedTuple):
+    """What rounding left out of the sums that a step adds to, for `core.compensated`.
+
+    position: (3, N) [m]; deformation, total: (3, 3, N), `total` None where the state has none;
+    time: () [s]. Position plus residual is where a particle is, to about twice the digits; nothing
+    but the next sum reads it, and no gradient goes through it.
+    """
+
+    position: Array
+    deformation: Array
+    total: Array | None
+    time: Array
+
+
 class State(NamedTuple):
     """What a step changes. Particle axis last.
 
     position: (3, N) [m]; velocity: (3, N) [m/s]; affine: (3, 3, N), C [1/s];
     deformation: (3, 3, N), the elastic trial gradient; total: (3, 3, N), the total gradient, or
     None where it is the same or not asked for; history: (H, N) or None if no law keeps any;
-    time: () [s]; status: `Status`.
+    time: () [s]; status: `Status`; residual: `Residual`, or None in float64, where sums have digits
+    to spare.
     """
 
     position: Array
@@ -121,6 +151,7 @@ class State(NamedTuple):
     history: Array | None
     time: Array
     status: Status
+    residual: Residual | None = None
 
 
 def initial_state(
@@ -135,7 +166,8 @@ def initial_state(
 
     position: (N, 3) [m]; velocity: (N, 3) [m/s], default 0; deformation: (N, 3, 3), default the
     identity; affine: (N, 3, 3) [1/s], default 0; dtype: default that of `position`.
-    Raises `InputError` if a shape is wrong or there are not as many particles as segments cover.
+    Raises `InputError` if a shape is wrong, there are not as many particles as segments cover, or
+    a particle is turned inside out: det F <= 0 (of traced arrays the first step's status tells).
     """
     count = config.particles
     position = jnp.asarray(position, dtype)
@@ -156,7 +188,9 @@ def initial_state(
     def zeros(*shape):
         return jnp.zeros((*shape, count), dtype)
 
-    if deformation is None:
+    if deformation is not None:
+        _refuse_inverted(deformation)
+    else:
         deformation = jnp.broadcast_to(jnp.eye(3, dtype=dtype), (count, 3, 3))
     history = None
     if config.history_rows:
@@ -167,12 +201,21 @@ def initial_state(
             columns.append(jnp.broadcast_to(initial[:, None], (config.history_rows, stop - start)))
         history = jnp.concatenate(columns, axis=1)
 
+    total = last("deformation", deformation, (3, 3)) if config.keeps_total else None
+    residual = None
+    if jnp.finfo(dtype).bits < 64:
+        residual = Residual(
+            position=zeros(3),
+            deformation=zeros(3, 3),
+            total=None if total is None else zeros(3, 3),
+            time=jnp.zeros((), dtype),
+        )
     return State(
         position=last("position", position, (3,)),
         velocity=zeros(3) if velocity is None else last("velocity", velocity, (3,)),
         affine=zeros(3, 3) if affine is None else last("affine", affine, (3, 3)),
         deformation=last("deformation", deformation, (3, 3)),
-        total=last("deformation", deformation, (3, 3)) if config.keeps_total else None,
+        total=total,
         history=history,
         time=jnp.zeros((), dtype),
         status=Status(
@@ -181,4 +224,18 @@ def initial_state(
             particle=jnp.array(-1, jnp.int32),
             taken=jnp.array(0, jnp.int32),
         ),
+        residual=residual,
     )
+
+
+def _refuse_inverted(deformation) -> None:
+    """Raises `InputError` if some det F of concrete gradients (N, 3, 3) is not positive."""
+    if isinstance(deformation, jax.core.Tracer) or np.shape(deformation)[1:] != (3, 3):
+        return
+    volume = np.linalg.det(np.asarray(deformation, np.float64))
+    wrong = np.flatnonzero(volume <= 0)
+    if wrong.size:
+        raise InputError(
+            f"initial_state: deformation[{wrong[0]}] has determinant {volume[wrong[0]]:.3g}: no "
+            "motion leads there; give gradients with det F > 0."
+        )

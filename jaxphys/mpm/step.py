@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jax import Array
 
-from jaxphys.core import algebra
+from jaxphys.core import algebra, compensated
 from jaxphys.core.errors import InputError
 
 from .boundaries import GridBoundary
@@ -11,6 +11,9 @@ from .grid import node_coordinates
 from .kernel import base_node, inside
 from .particle_boundaries import ParticleBoundary
 from .state import (
+    CODES,
+    COLLAPSED,
+    INVERTED,
     LEFT_GRID,
     LEFT_WINDOW,
     NOT_FINITE,
@@ -18,10 +21,13 @@ from .state import (
     STEP_TOO_LARGE,
     Config,
     Model,
+    Residual,
     State,
     Status,
 )
 from .transfer import grid_to_particle, particle_to_grid, window_origin
+
+COLLAPSE = 1e-3  # share of its volume below which a particle counts as collapsed
 
 
 def step(config: Config, model: Model, state: State, dt) -> State:
@@ -31,6 +37,10 @@ def step(config: Config, model: Model, state: State, dt) -> State:
     the grid, gravity and grid boundaries, velocity and its gradient back, particle boundaries,
     x <- x + dt v, F <- (I + dt C) F. The status says what failed first; the step itself goes on
     whatever happens, and addresses no memory outside the grid.
+
+    In float32 the sums x, F and time carry what rounding left out (`State.residual`), without which
+    steps of stiff matter are too small to move it. A law that returns another F than it was given
+    leaves that of F as it is: right where nothing yields, and off by a rounding of F where it does.
     """
     grid, shape = config.grid, config.nodes
     dt = jnp.asarray(dt, state.position.dtype)
@@ -57,9 +67,15 @@ def step(config: Config, model: Model, state: State, dt) -> State:
     )
     C = moment * (4.0 / grid.spacing**2)
     velocity = move_particles(model, state, velocity, dt)
-    position = state.position + dt * velocity
-    F = advance_gradient(F, C, dt)
-    total = None if state.total is None else advance_gradient(state.total, C, dt)
+    carried = state.residual or Residual(None, None, None, None)
+    position, position_rest = compensated.add(state.position, carried.position, dt * velocity)
+    time, time_rest = compensated.add(state.time, carried.time, dt)
+    F, F_rest = compensated.add(F, carried.deformation, dt * algebra.matmul(C, F))
+    total, total_rest = state.total, None
+    if total is not None:
+        change = dt * algebra.matmul(C, total)
+        total, total_rest = compensated.add(total, carried.total, change)
+    residual = Residual(position_rest, F_rest, total_rest, time_rest)
     return State(
         position=position,
         velocity=velocity,
@@ -67,8 +83,9 @@ def step(config: Config, model: Model, state: State, dt) -> State:
         deformation=F,
         total=total,
         history=history,
-        time=state.time + dt,
-        status=judge(config, state, position, velocity, F, dt, origin),
+        time=time,
+        status=judge(config, state, position, velocity, C, F, dt, origin),
+        residual=None if state.residual is None else residual,
     )
 
 
@@ -105,9 +122,11 @@ def update_grid(
     mass = rows[:, 3:]
     least = jnp.finfo(rows.dtype).eps ** 2 * jnp.max(model.mass)
     filled = mass > least
-    # All four columns at once: XLA would otherwise pad each row that a transfer reads.
-    fall = dt * jnp.concatenate([model.gravity, jnp.zeros_like(model.gravity[:1])])
-    rows = jnp.where(filled, rows / jnp.where(filled, mass, 1.0) + fall, 0.0)
+    rows = rows / jnp.where(filled, mass, 1.0)
+    if model.gravity is not None:
+        # All four columns at once: XLA would otherwise pad each row that a transfer reads.
+        rows = rows + dt * jnp.concatenate([model.gravity, jnp.zeros_like(model.gravity[:1])])
+    rows = jnp.where(filled, rows, 0.0)
     boundaries = [b for b in model.boundaries if isinstance(b, GridBoundary)]
     if not boundaries:
         return rows
@@ -134,24 +153,27 @@ def move_particles(model: Model, state: State, velocity: Array, dt: Array) -> Ar
     return velocity
 
 
-def advance_gradient(F: Array, C: Array, dt: Array) -> Array:
-    """(I + dt C) F for (3, 3, N). Written as F + dt C F, which keeps small strains exact."""
-    return F + dt * algebra.matmul(C, F)
-
-
 def judge(
     config: Config,
     before: State,
     position: Array,
     velocity: Array,
+    C: Array,
     F: Array,
     dt: Array,
     origin: Array,
 ) -> Status:
-    """The status after a step. The first failure stays; of one step, the lowest particle's."""
+    """The status after a step. The first failure stays; of one step, the lowest particle's.
+
+    A step multiplies det F by det(I + dt C), so that only one with |dt C| >= 1 can turn a particle
+    inside out: that is a step too large. What is inverted without one was given so, and no law
+    brings it back: Hencky's take a mirror image for rest.
+    """
     grid, status = config.grid, before.status
     finite = jnp.isfinite(jnp.sum(velocity, axis=0) + jnp.sum(F, axis=(0, 1)))
     slow = jnp.sum(velocity**2, axis=0) * dt**2 <= grid.spacing**2
+    slow &= jnp.sum(C**2, axis=(0, 1)) * dt**2 <= 1
+    volume = algebra.determinant(F)
     code = jnp.full(finite.shape, OK, jnp.int32)
     if config.nodes != grid.shape:
         # A particle that outgrew the window was clamped in the transfers of this very step.
@@ -159,16 +181,19 @@ def judge(
         local = base_node(before.position, grid.spacing, grid.shape) - origin[:, None]
         code = jnp.where(jnp.all(local <= room, axis=0), code, LEFT_WINDOW)
     code = jnp.where(inside(position, grid.spacing, grid.shape), code, LEFT_GRID)
+    code = jnp.where(volume < COLLAPSE, COLLAPSED, code)
+    code = jnp.where(volume <= 0, INVERTED, code)
     code = jnp.where(slow, code, STEP_TOO_LARGE)
     code = jnp.where(finite, code, NOT_FINITE)
     # One reduction finds the particle and its code together.
     count = code.shape[0]
-    keys = jnp.where(code == OK, 8 * count, 8 * jnp.arange(count, dtype=jnp.int32) + code)
+    index = jnp.arange(count, dtype=jnp.int32)
+    keys = jnp.where(code == OK, CODES * count, CODES * index + code)
     first = jnp.min(keys)
-    fails = (status.code == OK) & (first < 8 * count)
+    fails = (status.code == OK) & (first < CODES * count)
     return Status(
-        code=jnp.where(fails, first % 8, status.code),
+        code=jnp.where(fails, first % CODES, status.code),
         step=jnp.where(fails, status.taken, status.step),
-        particle=jnp.where(fails, first // 8, status.particle),
+        particle=jnp.where(fails, first // CODES, status.particle),
         taken=status.taken + 1,
     )

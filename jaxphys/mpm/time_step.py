@@ -8,45 +8,63 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jaxphys.core import algebra
 from jaxphys.core.errors import InputError
-from jaxphys.core.spectral import log_stretches, volume_change
+from jaxphys.core.spectral import eigen_symmetric, log_stretches
 from jaxphys.mpm.elasticity import lame
 from jaxphys.mpm.law import Law, Parameters
 
 ADVECTION = 0.5
 GRADIENT = 0.2
 SAFETY = 0.8
+# A particle alone that is strained by e may swing out to sqrt(e^2 + SWING^2), or to sqrt(3 / 2) e
+# where that is less.
+SWING = 0.007
 
 
 class StepBounds(NamedTuple):
-    """Upper bounds of the time step [s], and the step to take.
+    """Upper bounds of the time step [s], arrays () or numbers, and the step to take.
 
     Attributes:
         sound: a wave may not cross more than a cell.
         isolated: a particle alone may not overshoot.
-        advection: a particle may not cross more than half a cell.
+        advection: a particle may not cross more than half a cell, after a fall through the domain.
         gradient: the deformation may not change by more than a fifth.
+        contact: what touches a boundary may not overshoot.
         dt: the smallest of them times the safety factor.
-        reason: which of them it is: the name of its field.
     """
 
-    sound: float
-    isolated: float
-    advection: float
-    gradient: float
-    dt: float
-    reason: str
+    sound: Array | float
+    isolated: Array | float
+    advection: Array | float
+    gradient: Array | float
+    contact: Array | float
+    dt: Array | float
+
+    @property
+    def reason(self) -> str:
+        """The name of the smallest bound. Not for use inside jit."""
+        return min(self._fields[:-1], key=lambda name: float(getattr(self, name)))
+
+    @property
+    def limit(self) -> float:
+        """The smallest bound [s], without the safety factor. Not for use inside jit."""
+        return float(getattr(self, self.reason))
 
 
-def stiffness(law: Law, parameters: Parameters, F: Array) -> Array:
-    """Largest J rho0 c^2 [Pa] of all waves through each particle, shape (...).
+def moduli(law: Law, parameters: Parameters, s: Array) -> tuple[Array, Array]:
+    """What resists a further small strain at principal stretches s (3, ...): (wave, lone), each
+    (...) [Pa].
 
-    Sun, Shinar and Schroeder (2020, section 4.1): with psi the energy of principal stretches s, the
-    largest of s_i^2 psi_ii and s_i s_j (s_i psi_i - s_j psi_j) / (s_i^2 - s_j^2), the latter being
-    s_i s_j (psi_i + s_i psi_ii - s_j psi_ij) / (2 s_i) where s_i = s_j. At F = I it is lambda + 2
-    mu.
+    wave: the largest rho0 c^2 of all waves, c being their speed in space, not at rest (Sun, Shinar
+    and Schroeder 2020, section 4.1). With psi the energy of s, the largest of s_i^2 psi_ii and s_i
+    s_j r_ij, where r_ij = (s_i psi_i - s_j psi_j) / (s_i^2 - s_j^2), or where s_i = s_j its limit
+    (psi_i + s_i psi_ii - s_j psi_ij) / (2 s_i). At s = 1 it is lambda + 2 mu.
+
+    lone: the largest eigenvalue of d tau / d e, of the Kirchhoff stress by a strain e after s. It
+    has the block s_i s_j psi_ij + delta_ij s_i psi_i of stretching and the eigenvalues (s_i^2 +
+    s_j^2) r_ij of shearing. At s = 1 it is the larger of 2 mu + 3 lambda and 2 mu.
     """
-    s = jnp.exp(log_stretches(F))
 
     def slope(s):
         return jax.grad(lambda x: jnp.sum(law.principal_energy(parameters, x)))(s)
@@ -56,90 +74,157 @@ def stiffness(law: Law, parameters: Parameters, F: Array) -> Array:
     for i in range(3):
         direction = jnp.zeros_like(s).at[i].set(1)
         second.append(jax.jvp(slope, (s,), (direction,))[1])
-    terms = [s[i] ** 2 * second[i][i] for i in range(3)]
-    near = jnp.finfo(F.dtype).eps ** (1 / 3)
+    waves = [s[i] ** 2 * second[i][i] for i in range(3)]
+    stretching = [[s[i] * s[j] * second[i][j] for j in range(3)] for i in range(3)]
+    for i in range(3):
+        stretching[i][i] += s[i] * first[i]
+    alone = list(eigen_symmetric(algebra.stack_matrix(stretching))[0])
+    near = jnp.finfo(s.dtype).eps ** (1 / 3)
     for i, j in ((0, 1), (0, 2), (1, 2)):
+        squares = s[i] ** 2 + s[j] ** 2
         gap = s[i] ** 2 - s[j] ** 2
-        close = jnp.abs(gap) < near * (s[i] ** 2 + s[j] ** 2)
+        close = jnp.abs(gap) < near * squares
         limit = (first[i] + s[i] * second[i][i] - s[j] * second[i][j]) / (2 * s[i])
         ratio = (s[i] * first[i] - s[j] * first[j]) / jnp.where(close, 1, gap)
-        terms.append(s[i] * s[j] * jnp.where(close, limit, ratio))
-    return jnp.max(jnp.stack(terms), axis=0)
+        ratio = jnp.where(close, limit, ratio)
+        waves.append(s[i] * s[j] * ratio)
+        alone.append(squares * ratio)
+    return jnp.max(jnp.stack(waves), axis=0), jnp.max(jnp.stack(alone), axis=0)
 
 
-def sound_bound(law: Law, parameters: Parameters, F: Array, density: Array, spacing: float):
-    """dx / c [s] with c = sqrt(stiffness / (J rho0)), the smallest over the particles, shape ().
-
-    The von Neumann limit of APIC with quadratic splines lies at 1.0 dx / c (Bai and Schroeder 2022,
-    figure 4).
-    """
-    J = jnp.maximum(jnp.abs(1 + volume_change(F)), jnp.finfo(F.dtype).eps)
-    # F F^T does not tell the moduli of a state that has lost its stiffness from those at rest.
-    mu, lam = lame(parameters)
-    modulus = jnp.maximum(stiffness(law, parameters, F) / J, lam + 2 * mu)
-    return spacing * jnp.min(jnp.sqrt(density / modulus))
-
-
-def isolated_bound(parameters: Parameters, density: Array, spacing: float):
-    """dx sqrt(rho0 / (2 mu + 3 lambda)) [s], the smallest over the particles, shape ().
-
-    A single particle under MLS-MPM with quadratic splines and APIC, after Bai and Schroeder (2022,
-    technical document, 3.12): stricter than the speed of sound in a body, and what particles that
-    break away must obey.
-    """
+def rest_moduli(parameters: Parameters) -> tuple[Array, Array]:
+    """`moduli` at rest in closed form."""
     mu, lam = lame(parameters)
     # For nu < 0 shearing is the stiffer motion.
-    return spacing * jnp.min(jnp.sqrt(density / (2 * mu + 3 * jnp.maximum(lam, 0))))
+    return lam + 2 * mu, 2 * mu + 3 * jnp.maximum(lam, 0)
+
+
+def _step_of(spacing: float, density: Array, modulus: Array) -> Array:
+    """dx sqrt(rho0 / modulus) [s]; unbounded for what has no mass, and so exerts no force."""
+    return jnp.where(density > 0, spacing * jnp.sqrt(density / modulus), jnp.inf)
+
+
+def present_bounds(
+    law: Law, parameters: Parameters, F: Array, density: Array, spacing: float
+) -> tuple[Array, Array]:
+    """(sound, isolated) [s] of each particle as it is now deformed, (...).
+
+    sound: dx / c, the von Neumann limit of APIC with quadratic splines (Bai and Schroeder 2022,
+    figure 4). isolated: dx sqrt(rho0 / lone modulus). A particle that shares its nodes with no
+    other obeys C' = C - dt (4 / dx^2) tau(F) / rho0 and F' = (I + dt C') F, a leapfrog of the
+    frequency 2 / dx sqrt(lone / rho0), stable up to twice its inverse: at rest that is the bound of
+    Bai and Schroeder (technical document, 3.12).
+    """
+    present = moduli(law, parameters, jnp.exp(log_stretches(F)))
+    # F F^T does not tell the moduli of a state that has lost its stiffness from those at rest.
+    largest = map(jnp.maximum, present, rest_moduli(parameters))
+    return tuple(_step_of(spacing, density, modulus) for modulus in largest)
+
+
+def isolated_bound(
+    law: Law, parameters: Parameters, F: Array, C: Array, density: Array, spacing: float
+) -> Array:
+    """How long a step may be for a particle that swings alone, [s], (...).
+
+    Its strain will reach e, e^2 being the largest log stretch squared and what the strain rate adds
+    to it, (|sym C| dx / 2)^2 rho0 / lone; and it will come back at the other side, where a law may
+    be several times stiffer. So the lone modulus is the largest of those at stretches exp(-e), 1
+    and exp(e).
+
+    At a share q of the limit of stability the leapfrog swings out to e / sqrt(1 - q^2). The
+    bound lets that be sqrt(e^2 + SWING^2), or sqrt(3/2) e where that is less: q = 1 at rest, which
+    is the sharp limit, and q = 0.58 from a strain of a hundredth on.
+    """
+    _, rest = rest_moduli(parameters)
+    rate = 0.5 * (C + algebra.transpose(C))
+    strain = jnp.max(log_stretches(F) ** 2, axis=0)
+    strain += jnp.sum(rate**2, axis=(0, 1)) * spacing**2 / 4 * density / rest
+    e = jnp.sqrt(strain)
+    squeezed, stretched = (
+        moduli(law, parameters, jnp.exp(jnp.stack([side * e] * 3)))[1] for side in (-1, 1)
+    )
+    modulus = jnp.maximum(rest, jnp.maximum(squeezed, stretched))
+    return _step_of(spacing, density, modulus * (1 + jnp.minimum(strain / SWING**2, 2)))
+
+
+def _by_segment(config, model, function, *fields):
+    """`function(law, parameters, *fields, density, spacing)` of every segment."""
+    density = model.mass / jnp.where(model.mass > 0, model.volume, 1)
+    for law, start, stop in config.segments:
+        parameters = {name: model.parameters[name][start:stop] for name in law.parameters}
+        cut = (field[..., start:stop] for field in (*fields, density))
+        yield function(law, parameters, *cut, config.grid.spacing)
+
+
+def contact_bound(model, grid) -> Array:
+    """2 / sqrt(k/m) [s], (), for the stiffest contact k/m [1/s^2] of all boundaries that have a
+    method `stiffest(model, grid)`; infinite without one.
+    """
+    rates = [b.stiffest(model, grid) for b in model.boundaries if hasattr(b, "stiffest")]
+    return 2 / jnp.sqrt(jnp.max(jnp.stack(rates))) if rates else jnp.asarray(jnp.inf)
+
+
+def hard_limits(config, model, state) -> Array:
+    """The step [s] beyond which each particle is unstable as it is now, (N,)."""
+    limits = [
+        jnp.minimum(*bounds)
+        for bounds in _by_segment(config, model, present_bounds, state.deformation)
+    ]
+    limits = limits[0] if len(limits) == 1 else jnp.concatenate(limits)
+    return jnp.minimum(limits, contact_bound(model, config.grid))
+
+
+def fastest(config, model, state) -> Array:
+    """Largest speed [m/s], (), of a particle now or after a free fall to the end of the domain."""
+    squared = jnp.sum(state.velocity**2, axis=0)
+    if model.gravity is not None:
+        ends = jnp.maximum(model.gravity * jnp.array(config.grid.extent, squared.dtype), 0)
+        drop = jnp.sum(ends) - jnp.sum(model.gravity[:, None] * state.position, axis=0)
+        squared = squared + 2 * jnp.maximum(drop, 0)
+    return jnp.sqrt(jnp.max(squared))
+
+
+def step_bounds(config, model, state, safety: float = SAFETY) -> StepBounds:
+    """The bounds that the state sets to the time step, as arrays (). Pure.
+
+    Args:
+        config: with `grid` and `segments` ((law, start, stop), ...).
+        model: with `mass` (N,), `volume` (N,), `parameters`, `gravity` and `boundaries`.
+        state: with `position`, `velocity` (3, N), `affine` and `deformation` (3, 3, N).
+        safety: what share of the smallest bound to take.
+    """
+    F, C = state.deformation, state.affine
+    present = _by_segment(config, model, present_bounds, F)
+    swings = _by_segment(config, model, isolated_bound, F, C)
+
+    def least(bounds):
+        return jnp.min(jnp.stack([jnp.min(bound) for bound in bounds]))
+
+    bounds = (
+        least(sound for sound, _ in present),
+        least(swings),
+        ADVECTION * config.grid.spacing / fastest(config, model, state),
+        GRADIENT / jnp.sqrt(jnp.max(jnp.sum(C**2, axis=(0, 1)))),
+        contact_bound(model, config.grid),
+    )
+    return StepBounds(*bounds, dt=safety * jnp.min(jnp.stack(bounds)))
+
+
+_compiled_bounds = jax.jit(step_bounds, static_argnums=(0, 3))
 
 
 def largest_stable_dt(config, model, state, safety: float = SAFETY) -> StepBounds:
-    """The bounds that the state sets to the time step. Runs on the host; each bound in one jitted
-    call.
-
-    Args:
-        config: with `grid.spacing` [m] and `segments` ((law, start, stop), ...).
-        model: with `mass` (N,), `volume` (N,) and `parameters`.
-        state: with `velocity` (3, N), `affine` (3, 3, N) and `deformation` (3, 3, N).
-        safety: what share of the smallest bound to take.
+    """`step_bounds` as numbers. Runs on the host, in one compiled call.
 
     Raises:
         InputError: no bound is positive and finite, since the state is not finite.
     """
-    spacing = config.grid.spacing
-    bounds = {"sound": math.inf, "isolated": math.inf}
-    density = model.mass / model.volume
-    for law, start, stop in config.segments:
-        parameters = {name: model.parameters[name][start:stop] for name in law.parameters}
-        sound, isolated = _segment_bounds(
-            law, spacing, parameters, state.deformation[:, :, start:stop], density[start:stop]
-        )
-        bounds["sound"] = min(bounds["sound"], float(sound))
-        bounds["isolated"] = min(bounds["isolated"], float(isolated))
-    speed, rate = (float(x) for x in _motion(state.velocity, state.affine))
-    bounds["advection"] = ADVECTION * spacing / speed if speed else math.inf
-    bounds["gradient"] = GRADIENT / rate if rate else math.inf
-    reason = min(bounds, key=lambda name: bounds[name])
-    if not all(bound > 0 for bound in bounds.values()) or math.isinf(bounds[reason]):
+    bounds = StepBounds(*(float(bound) for bound in _compiled_bounds(config, model, state, safety)))
+    if not all(bound > 0 for bound in bounds) or math.isinf(bounds.limit):
         raise InputError(
-            f"time step: the state gives no bound ({bounds}); its numbers are not finite"
+            f"time step: the state gives no bound ({bounds._asdict()}); its numbers are not finite"
         )
-    return StepBounds(**bounds, dt=safety * bounds[reason], reason=reason)
-
-
-@jax.jit(static_argnums=(0, 1))
-def _segment_bounds(law, spacing, parameters, F, density):
-    return (
-        sound_bound(law, parameters, F, density, spacing),
-        isolated_bound(parameters, density, spacing),
-    )
-
-
-@jax.jit
-def _motion(velocity, affine):
-    return (
-        jnp.sqrt(jnp.max(jnp.sum(velocity**2, axis=0))),
-        jnp.sqrt(jnp.max(jnp.sum(affine**2, axis=(0, 1)))),
-    )
+    return bounds
 
 
 def validate_dt(dt: float, bounds: StepBounds, *, unsafe: bool = False) -> None:
@@ -156,9 +241,8 @@ def validate_dt(dt: float, bounds: StepBounds, *, unsafe: bool = False) -> None:
     """
     if not (dt > 0 and np.isfinite(dt)):
         raise InputError(f"time step is {dt}, must be positive and finite")
-    limit = getattr(bounds, bounds.reason)
-    if dt > limit and not unsafe:
+    if dt > bounds.limit and not unsafe:
         raise InputError(
-            f"time step {dt:.3g} s breaks the {bounds.reason} bound {limit:.3g} s; "
+            f"time step {dt:.3g} s breaks the {bounds.reason} bound {bounds.limit:.3g} s; "
             f"the largest safe one is {bounds.dt:.3g} s"
         )
