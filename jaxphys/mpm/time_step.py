@@ -161,7 +161,9 @@ def contact_bound(model, grid) -> Array:
     method `stiffest(model, grid)`; infinite without one.
     """
     rates = [b.stiffest(model, grid) for b in model.boundaries if hasattr(b, "stiffest")]
-    return 2 / jnp.sqrt(jnp.max(jnp.stack(rates))) if rates else jnp.asarray(jnp.inf)
+    if not rates:
+        return jnp.asarray(jnp.inf, model.mass.dtype)
+    return 2 / jnp.sqrt(jnp.max(jnp.stack(rates)))
 
 
 def hard_limits(config, model, state) -> Array:

@@ -1,16 +1,22 @@
-from types import SimpleNamespace
+from dataclasses import dataclass, replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
+from jaxphys.mpm.boundaries import damping
 from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN, lame
+from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.state import Config, Model, initial_state
 from jaxphys.mpm.time_step import (
+    hard_limits,
     isolated_bound,
     largest_stable_dt,
-    sound_bound,
-    stiffness,
+    moduli,
+    present_bounds,
+    step_bounds,
     validate_dt,
 )
 
@@ -24,58 +30,172 @@ def still(count=4, dtype=jnp.float64):
     return jnp.broadcast_to(jnp.eye(3, dtype=dtype)[:, :, None], (3, 3, count))
 
 
-def scene(velocity=0.0, affine=0.0, modulus=1e5, F=None):
-    config = SimpleNamespace(
-        grid=SimpleNamespace(spacing=SPACING), segments=((NEO_HOOKEAN, 0, 2), (HENCKY, 2, 4))
-    )
-    model = SimpleNamespace(
+def scene(velocity=0.0, affine=0.0, modulus=1e5, gravity=None, boundaries=()):
+    """Four particles at (0.5, 0.5, 0.5) m in a domain of 1 x 1 x 2 m."""
+    config = Config(Grid((21, 21, 41), SPACING), ((NEO_HOOKEAN, 0, 2), (HENCKY, 2, 4)))
+    model = Model(
         mass=DENSITY * 1e-3,
         volume=jnp.full(4, 1e-3),
         parameters={"youngs_modulus": jnp.full(4, modulus), "poisson_ratio": jnp.full(4, 0.3)},
+        gravity=gravity,
+        boundaries=boundaries,
     )
-    state = SimpleNamespace(
-        velocity=jnp.zeros((3, 4)).at[1, 2].set(velocity),
-        affine=jnp.zeros((3, 3, 4)).at[0, 1, 1].set(affine),
-        deformation=still() if F is None else F,
+    state = initial_state(config, jnp.full((4, 3), 0.5))
+    state = state._replace(
+        velocity=state.velocity.at[1, 2].set(velocity), affine=state.affine.at[0, 1, 1].set(affine)
     )
     return config, model, state
 
 
+def sound(law, F):
+    return float(jnp.min(present_bounds(law, VALUES, F, DENSITY, SPACING)[0]))
+
+
+def isolated(law, F, C=0.0):
+    bounds = isolated_bound(law, VALUES, F, jnp.full((3, 3, 4), C), DENSITY, SPACING)
+    return float(jnp.min(bounds))
+
+
 @pytest.mark.parametrize("law", LAWS, ids=repr)
-def test_at_rest_the_stiffness_is_the_p_wave_modulus(law):
-    np.testing.assert_allclose(stiffness(law, VALUES, still()), LAM + 2 * MU, rtol=1e-6)
+def test_moduli_at_rest(law):
+    wave, lone = moduli(law, VALUES, jnp.ones((3, 4)))
+    np.testing.assert_allclose(wave, LAM + 2 * MU, rtol=1e-6)
+    np.testing.assert_allclose(lone, 2 * MU + 3 * LAM, rtol=1e-6)
     c = np.sqrt((LAM + 2 * MU) / 900)
-    bound = sound_bound(law, VALUES, still(), DENSITY, SPACING)
-    assert float(bound) == pytest.approx(SPACING / c, rel=1e-6)
+    assert sound(law, still()) == pytest.approx(SPACING / c, rel=1e-6)
 
 
-def test_stiffness_of_a_stretch_in_closed_form():
+E = np.array([-0.4, 0.1, 0.05])
+
+
+def test_waves_in_a_stretched_body_in_closed_form():
     """Hencky: along i, s_i^2 psi_ii = (2 mu + lambda) - (2 mu e_i + lambda tr e)."""
-    e = np.array([-0.4, 0.1, 0.05])
-    F = jnp.asarray(np.diag(np.exp(e))[:, :, None])
-    tau = 2 * MU * e + LAM * e.sum()
+    tau = 2 * MU * E + LAM * E.sum()
     axial = (2 * MU + LAM) - tau
     pairs = [
-        np.exp(e[i] + e[j]) * (tau[i] - tau[j]) / (np.exp(2 * e[i]) - np.exp(2 * e[j]))
+        np.exp(E[i] + E[j]) * (tau[i] - tau[j]) / (np.exp(2 * E[i]) - np.exp(2 * E[j]))
         for i, j in ((0, 1), (0, 2), (1, 2))
     ]
     expected = max(*axial, *pairs)
-    assert float(stiffness(HENCKY, VALUES, F)[0]) == pytest.approx(expected, rel=1e-9)
+    wave, _ = moduli(HENCKY, VALUES, jnp.exp(jnp.asarray(E))[:, None])
+    assert float(wave[0]) == pytest.approx(expected, rel=1e-9)
     assert expected > LAM + 2 * MU
 
 
+def test_the_speed_of_sound_is_the_one_in_space():
+    """A rod of rho0 and energy psi(s) a rest length, stretched by s: waves run at sqrt(psi'' /
+    rho0) in rest lengths, at s times that in space, whatever its volume has become.
+    """
+    s = np.array([1.6, 1.0, 1.0])
+    second = MU * (1 + s[0] ** -2) + LAM * (1 - np.log(s[0])) / s[0] ** 2
+    assert s[0] ** 2 * second > LAM + 2 * MU
+    F = jnp.asarray(np.diag(s))[..., None] * jnp.ones(4)
+    expected = SPACING / (s[0] * np.sqrt(second / 900))
+    assert sound(NEO_HOOKEAN, F) == pytest.approx(expected, rel=1e-6)
+
+
 @pytest.mark.parametrize("law", LAWS, ids=repr)
-def test_compression_shortens_the_step(law):
-    squeezed = still() * 0.6
-    assert float(sound_bound(law, VALUES, squeezed, DENSITY, SPACING)) < float(
-        sound_bound(law, VALUES, still(), DENSITY, SPACING)
-    )
+def test_lone_modulus_is_the_largest_eigenvalue_of_the_stress_derivative(law):
+    """By differences of the law's own stress over the nine further strains."""
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    F = jnp.asarray(turn @ np.diag(np.exp(E)))[..., None]
+    h = 1e-5
+    columns = []
+    for i in range(3):
+        for j in range(i, 3):
+            # Six symmetric strains, orthonormal.
+            e = np.zeros((3, 3))
+            e[i, j] = e[j, i] = 1 if i == j else np.sqrt(0.5)
+            tau = []
+            for side in (-1, 1):
+                moved = jnp.einsum("ij,jkp->ikp", np.eye(3) + side * h * e, F)
+                tau.append(np.asarray(law.update(VALUES, moved, jnp.zeros((0, 1)))[1][..., 0]))
+            columns.append(((tau[1] - tau[0]) / (2 * h), e))
+    matrix = [[np.sum(a * e) for _, e in columns] for a, _ in columns]
+    expected = np.linalg.eigvals(np.array(matrix)).real.max()
+    _, lone = moduli(law, VALUES, jnp.exp(jnp.asarray(E))[:, None])
+    assert float(lone[0]) == pytest.approx(expected, rel=1e-6)
 
 
 def test_an_isolated_particle_is_the_stricter_case():
-    isolated = float(isolated_bound(VALUES, DENSITY, SPACING))
-    assert isolated == pytest.approx(SPACING * np.sqrt(900 / (2 * MU + 3 * LAM)), rel=1e-12)
-    assert isolated < float(sound_bound(HENCKY, VALUES, still(), DENSITY, SPACING))
+    assert isolated(HENCKY, still()) == pytest.approx(
+        SPACING * np.sqrt(900 / (2 * MU + 3 * LAM)), rel=1e-12
+    )
+    assert isolated(HENCKY, still()) < sound(HENCKY, still())
+
+
+def test_strain_and_its_rate_shorten_the_isolated_bound():
+    # At a strain of 0.1 a Hencky particle keeps its modulus; the share is sqrt(1/3).
+    strained = isolated(HENCKY, jnp.exp(-0.1) * still())
+    assert strained == pytest.approx(isolated(HENCKY, still()) / np.sqrt(3), rel=1e-6)
+    # Fixed corotated stiffens as it swings back from 0.8 to beyond 1.2: the rebound decides.
+    squeezed = isolated(FIXED_COROTATED, 0.8 * still())
+    assert squeezed == pytest.approx(isolated(FIXED_COROTATED, 1.25 * still()), rel=1e-6)
+    assert squeezed < 0.6 * strained
+    # A rotation alone is no strain.
+    spin = jnp.zeros((3, 3, 4)).at[0, 1].set(50.0).at[1, 0].set(-50.0)
+    assert isolated(HENCKY, still(), spin) == pytest.approx(isolated(HENCKY, still()))
+    assert isolated(HENCKY, still(), jnp.abs(spin)) < 0.9 * isolated(HENCKY, still())
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Spring:
+    """A boundary that says how stiff its contact is, [1/s^2] a metre of spacing."""
+
+    rate: float = 1e9
+
+    def stiffest(self, model, grid):
+        return jnp.max(model.volume / model.mass) * self.rate * grid.spacing
+
+
+def test_contact_bounds_the_step_where_a_boundary_says_so():
+    assert np.isinf(largest_stable_dt(*scene()).contact)
+    bounds = largest_stable_dt(*scene(boundaries=(damping(1.0), Spring(), Spring(1e8))))
+    assert bounds.reason == "contact"
+    assert bounds.contact == pytest.approx(2 / np.sqrt(1e9 * SPACING / 900), rel=1e-6)
+    assert float(hard_limits(*scene(boundaries=(Spring(),))).max()) == pytest.approx(bounds.contact)
+
+
+def test_advection_knows_the_fall_that_is_coming():
+    # From the middle of a domain 1 x 1 x 2 m down to z = 0, with 3 m/s to start with.
+    still_there = largest_stable_dt(*scene(velocity=3.0))
+    falling = largest_stable_dt(*scene(velocity=3.0, gravity=jnp.array([0.0, 0.0, -9.8])))
+    assert still_there.advection == pytest.approx(0.5 * SPACING / 3)
+    speed = np.sqrt(9 + 2 * 9.8 * 0.5)
+    assert falling.advection == pytest.approx(0.5 * SPACING / speed, rel=1e-6)
+    # Up and sideways: to the corner (1, ., 2).
+    slanted = largest_stable_dt(*scene(gravity=jnp.array([2.0, 0.0, 4.0])))
+    speed = np.sqrt(2 * (2 * 0.5 + 4 * 1.5))
+    assert slanted.advection == pytest.approx(0.5 * SPACING / speed, rel=1e-6)
+
+
+def test_hard_limits_name_the_particle_that_is_stiffest():
+    config, model, state = scene()
+    moduli = {"youngs_modulus": jnp.array([1e5, 1e5, 4e5, 1e5])}
+    model = replace(model, parameters=model.parameters | moduli)
+    limits = hard_limits(config, model, state)
+    rest = SPACING * np.sqrt(900 / (2 * MU + 3 * LAM))
+    np.testing.assert_allclose(limits, rest * np.array([1, 1, 0.5, 1]), rtol=1e-6)
+
+
+def test_bounds_can_be_traced_and_differentiated():
+    config, model, state = scene()
+
+    def bound(modulus):
+        moduli = {"youngs_modulus": jnp.full(4, modulus)}
+        changed = replace(model, parameters=model.parameters | moduli)
+        return step_bounds(config, changed, state).sound
+
+    slope = jax.jit(jax.grad(bound))(1e5)
+    assert float(slope) == pytest.approx(-0.5 * float(bound(1e5)) / 1e5, rel=1e-6)
+
+
+def test_what_has_no_mass_sets_no_bound():
+    config, model, state = scene()
+    expected = largest_stable_dt(config, model, state)
+    empty = replace(model, mass=model.mass.at[1].set(0), volume=model.volume.at[1].set(0))
+    assert largest_stable_dt(config, empty, state) == expected
 
 
 @pytest.mark.parametrize(
