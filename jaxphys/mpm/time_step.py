@@ -17,8 +17,7 @@ from jaxphys.mpm.law import Law, Parameters
 ADVECTION = 0.5
 GRADIENT = 0.2
 SAFETY = 0.8
-# A particle alone that is strained by e may swing out to sqrt(e^2 + SWING^2), or to sqrt(3 / 2) e
-# where that is less.
+# A particle alone may swing out from a strain a to sqrt(a^2 + SWING^2), or sqrt(3 / 2) a if less.
 SWING = 0.007
 
 
@@ -126,25 +125,24 @@ def isolated_bound(
 ) -> Array:
     """How long a step may be for a particle that swings alone, [s], (...).
 
-    Its strain will reach e, e^2 being the largest log stretch squared and what the strain rate adds
-    to it, (|sym C| dx / 2)^2 rho0 / lone; and it will come back at the other side, where a law may
-    be several times stiffer. So the lone modulus is the largest of those at stretches exp(-e), 1
-    and exp(e).
+    Strained by e, the largest log stretch, it comes back at the other side, where a law may be
+    several times stiffer: the lone modulus is the largest of those at stretches exp(-e), 1 and
+    exp(e).
 
-    At a share q of the limit of stability the leapfrog swings out to e / sqrt(1 - q^2). The
-    bound lets that be sqrt(e^2 + SWING^2), or sqrt(3/2) e where that is less: q = 1 at rest, which
-    is the sharp limit, and q = 0.58 from a strain of a hundredth on.
+    At a share q of the limit of stability the leapfrog swings out to a / sqrt(1 - q^2) of an
+    amplitude a; a^2 is e^2 and what the strain rate adds, (|sym C| dx / 2)^2 rho0 / lone. The bound
+    lets it swing out to sqrt(a^2 + SWING^2), or to sqrt(3/2) a where that is less: q = 1 at rest,
+    which is the sharp limit, and q = 0.58 from an amplitude of a hundredth on.
     """
     _, rest = rest_moduli(parameters)
     rate = 0.5 * (C + algebra.transpose(C))
-    strain = jnp.max(log_stretches(F) ** 2, axis=0)
-    strain += jnp.sum(rate**2, axis=(0, 1)) * spacing**2 / 4 * density / rest
-    e = jnp.sqrt(strain)
+    e = jnp.max(jnp.abs(log_stretches(F)), axis=0)
+    swing = e**2 + jnp.sum(rate**2, axis=(0, 1)) * spacing**2 / 4 * density / rest
     squeezed, stretched = (
         moduli(law, parameters, jnp.exp(jnp.stack([side * e] * 3)))[1] for side in (-1, 1)
     )
     modulus = jnp.maximum(rest, jnp.maximum(squeezed, stretched))
-    return _step_of(spacing, density, modulus * (1 + jnp.minimum(strain / SWING**2, 2)))
+    return _step_of(spacing, density, modulus * (1 + jnp.minimum(swing / SWING**2, 2)))
 
 
 def _by_segment(config, model, function, *fields):

@@ -12,7 +12,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.materials import MATERIALS
-from jaxphys.mpm.rollout import SimulationError, check, rollout
+from jaxphys.mpm.rollout import SimulationError, _choose, check, rollout
 from jaxphys.mpm.state import (
     COLLAPSED,
     INVERTED,
@@ -306,10 +306,16 @@ def test_the_gradient_of_a_failure_is_not_a_number():
     assert int(end.status.code) == UNSTABLE_STEP and bool(jnp.isfinite(value))
     np.testing.assert_array_equal(end.position, state.position)
     assert all(bool(jnp.isnan(g).all()) for g in gradient)
-    forward = jax.jit(
-        lambda dt: jax.jvp(lambda E: end_of(E, *numbers[1:], dt)[0], (1e3,), (1.0,))[1]
-    )
-    assert bool(jnp.isfinite(forward(1e-3))) and bool(jnp.isnan(forward(1.0)))
+
+
+def test_a_kept_value_has_no_tangent_either():
+    """Forward mode, which the transfers do not have, at the one place that decides."""
+    for good, slope in ((True, 5.0), (False, jnp.nan)):
+        value, found = jax.jvp(
+            lambda new, old, good=good: _choose(jnp.array(good), new, old), (1.0, 2.0), (5.0, 7.0)
+        )
+        assert float(value) == (1.0 if good else 2.0)
+        np.testing.assert_equal(float(found), slope)
 
 
 def test_no_gravity_is_not_traced():
