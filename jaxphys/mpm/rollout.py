@@ -123,17 +123,10 @@ def check_step(config: Config, model: Model, state: State, dt) -> State:
 def _keep_good(before: State, after: State) -> State:
     """`after`, or where it failed `before` with the status and step count of the failure."""
     good = after.status.code == OK
-    plain = State._fields[:-2]
-    kept = {
-        name: jax.tree.map(
-            lambda new, old: _choose(good, new, old), getattr(after, name), getattr(before, name)
-        )
-        for name in plain
-    }
-    residual = jax.tree.map(
-        lambda new, old: jnp.where(good, new, old), after.residual, before.residual
-    )
-    return State(**kept, status=after.status, residual=jax.lax.stop_gradient(residual))
+    residual = jax.tree.map(partial(jnp.where, good), after.residual, before.residual)
+    rest = (state._replace(status=None, residual=None) for state in (after, before))
+    kept = jax.tree.map(partial(_choose, good), *rest)
+    return kept._replace(status=after.status, residual=jax.lax.stop_gradient(residual))
 
 
 @jax.custom_jvp
