@@ -6,7 +6,8 @@ from jaxphys.core.errors import InputError
 from jaxphys.mpm.state import Config, Model, State
 from jaxphys.mpm.time_step import StepBounds, largest_stable_dt, validate_dt
 
-# The bounds hold for the initial state; an object that is pressed together gets stiffer.
+# The bounds hold for the initial state; an object that is pressed together gets stiffer, and a
+# frame that starts stiffer than its step allows fails.
 SAFETY = 0.75
 MOST_STEPS = 1_000_000
 

@@ -142,7 +142,12 @@ def solver_parts(
         for thing, part in zip(scene.objects, parts, strict=True)
     ]
     parameters, density, segments = assemble_parameters(described, dtype)
-    config = Config(grid, segments, track_total=scene.splats_follow == "total")
+    config = Config(
+        grid,
+        segments,
+        track_total=scene.splats_follow == "total",
+        check_step=not scene.unsafe_substep,
+    )
 
     def gathered(name: str) -> np.ndarray:
         return np.concatenate([getattr(part, name) for part in parts])[arrangement]
