@@ -1,5 +1,7 @@
 """Many steps in one compiled program, and what becomes of a simulation that fails."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 from jax import Array
