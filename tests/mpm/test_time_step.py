@@ -125,13 +125,19 @@ def test_an_isolated_particle_is_the_stricter_case():
 
 
 def test_strain_and_its_rate_shorten_the_isolated_bound():
-    # At a strain of 0.1 a Hencky particle keeps its modulus; the share is sqrt(1/3).
-    strained = isolated(HENCKY, jnp.exp(-0.1) * still())
+    # At a strain of 0.05 a Hencky particle keeps its modulus; the share is sqrt(1/3).
+    strained = isolated(HENCKY, jnp.exp(-0.05) * still())
     assert strained == pytest.approx(isolated(HENCKY, still()) / np.sqrt(3), rel=1e-6)
-    # Fixed corotated stiffens as it swings back from 0.8 to beyond 1.2: the rebound decides.
+    # Fixed corotated stiffens as it swings back from 0.8 to beyond: the rebound decides.
+    J, s = 1.25**3, 1.25
+    modulus = 2 * MU * (2 * s**2 - s) + 3 * LAM * (2 * J**2 - J)
     squeezed = isolated(FIXED_COROTATED, 0.8 * still())
-    assert squeezed == pytest.approx(isolated(FIXED_COROTATED, 1.25 * still()), rel=1e-6)
+    assert squeezed == pytest.approx(SPACING * np.sqrt(900 / (3 * modulus)), rel=1e-6)
     assert squeezed < 0.6 * strained
+    # From far off the energy decides: all of it as rate, a fifth a step.
+    energy = 0.5 * (2 * MU + 3 * LAM) * 3 * 0.3**2
+    rate = np.sqrt(8 * energy / (900 * SPACING**2))
+    assert isolated(HENCKY, jnp.exp(0.3) * still()) == pytest.approx(0.2 / rate, rel=1e-6)
     # A rotation alone is no strain.
     spin = jnp.zeros((3, 3, 4)).at[0, 1].set(50.0).at[1, 0].set(-50.0)
     assert isolated(HENCKY, still(), spin) == pytest.approx(isolated(HENCKY, still()))

@@ -262,7 +262,8 @@ def test_start_at_the_whole_step_costs_an_order():
 def test_isolated_bound_is_sharp(share, stable):
     particle = Particle(amplitude=1e-6)
     bounds = largest_stable_dt(*_solver_view(breathing(particle, 1.0, 1)))
-    assert np.isclose(bounds.isolated, particle.largest_stable_dt, rtol=1e-12)
+    # A strain of 1e-6 takes a share of some 1e-8 away.
+    assert np.isclose(bounds.isolated, particle.largest_stable_dt, rtol=1e-7)
     problem = breathing(particle, share * bounds.isolated, 1000, room=LINE)
     grown = abs(log_stretch_of(solve(problem))) / particle.amplitude
     assert (grown < 10) == stable
