@@ -106,22 +106,22 @@ def test_the_gradient_carries_no_residual():
     """A step of float32 keeps as many numbers for the way back as one of float64."""
 
     def kept(dtype):
-        """How many numbers 100 more steps keep."""
-        config, model, state = block(count=40, shape=(8, 8, 8), dtype=dtype)
-        sizes = []
-        for steps in (100, 200):
+        config, model, state = block(count=7, dtype=dtype)
 
-            def loss(position, steps=steps):
-                start = state._replace(position=position)
-                end = rollout(config, model, start, dt=1e-4, steps=steps)
-                return jnp.sum(end.position**2) + jnp.sum(end.deformation**2)
+        def loss(position):
+            end = rollout(config, model, state._replace(position=position), dt=dtype(1e-4), steps=5)
+            return jnp.sum(end.position**2) + jnp.sum(end.deformation**2)
 
-            compiled = jax.jit(jax.grad(loss)).lower(state.position).compile()
-            sizes.append(compiled.memory_analysis().temp_size_in_bytes)
-        return (sizes[1] - sizes[0]) / state.position.dtype.itemsize
+        jaxpr = jax.make_jaxpr(jax.grad(loss))(state.position).jaxpr
+        loops = [e for e in jaxpr.eqns if e.params.get("length") == 5]
+        forward, backward = loops
+        stacked = forward.outvars[forward.params["num_carry"] :]
+        sizes = [v.aval.size // 5 for v in stacked if jnp.issubdtype(v.aval.dtype, jnp.floating)]
+        return sum(sizes), len(backward.outvars)
 
-    narrow, wide = kept(jnp.float32), kept(jnp.float64)
-    assert narrow < 1.02 * wide
+    numbers, cotangents = kept(jnp.float32)
+    assert (numbers, cotangents) == kept(jnp.float64)
+    assert numbers >= 24 * 7 + 4 * 7 + 4 * 9 * 10 * 11  # a start and what the transfers gave
 
 
 # What is turned inside out, or as flat as a point.
@@ -196,7 +196,7 @@ def test_a_step_that_deforms_by_more_than_itself_is_too_large():
 
 # A particle alone at finite strain.
 
-STRAINS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
+STRAINS = (0.01, 0.03, 0.1, 0.3)
 LAWS = (FIXED_COROTATED, NEO_HOOKEAN, HENCKY)
 
 
@@ -227,8 +227,10 @@ def swing(share, bound, steps=5000):
     edges = np.cumsum([0, *(len(part) for part in parts)]).tolist()
     count = edges[-1]
     segments = tuple(zip(LAWS, edges[:-1], edges[1:], strict=True))
-    places = np.stack(np.meshgrid(*[0.21 + 0.3 * np.arange(5)] * 3, indexing="ij"), -1)
-    config = Config(Grid((16, 16, 16), SPACING), segments)
+    # Three nodes each, and none of them shared.
+    lines = [0.21 + 0.3 * np.arange(n) for n in (5, 5, 3)]
+    places = np.stack(np.meshgrid(*lines, indexing="ij"), -1)
+    config = Config(Grid((16, 16, 10), SPACING), segments)
     state = initial_state(config, places.reshape(-1, 3)[:count], deformation=np.concatenate(parts))
     parameters = {name: jnp.full(count, value) for name, value in ALONE.items()}
     dt, density = 1e-3, []
