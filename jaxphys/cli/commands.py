@@ -249,7 +249,7 @@ def plan(
         json: Print JSON.
     """
     from jaxphys.cli.scenes import scene_for, with_source
-    from jaxphys.scene.plan import as_text, make_plan
+    from jaxphys.pipeline.plan import as_text, make_plan
 
     config = scene / "config.json" if scene is not None and scene.is_dir() else scene
     asked = scene_for(config, material, {})

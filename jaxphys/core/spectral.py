@@ -18,6 +18,7 @@ from jax import Array
 from jax.lax import optimization_barrier
 
 from jaxphys.core import algebra
+from jaxphys.core.program import part
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
 
@@ -61,6 +62,7 @@ def _isolated_root(half_determinant: Array) -> Array:
 
 
 @jax.custom_jvp
+@part("eigen-decomposition")
 def eigen_symmetric(A: Array) -> tuple[Array, Array]:
     """Eigenvalues (3, ...), in no particular order, and eigenvectors (3, 3, ...) of symmetric (3,
     3, ...).
@@ -247,6 +249,7 @@ def _left_isotropic_jvp(function, primals, tangents):
 
 
 @jax.custom_jvp
+@part("polar rotation")
 def polar_rotation(F: Array) -> Array:
     """The rotation nearest to F: R of F = R S, always with det R = +1. Shape (3, 3, ...).
 

@@ -17,6 +17,7 @@ from jax import Array
 
 from jaxphys.core import algebra
 from jaxphys.core.errors import InputError
+from jaxphys.core.program import part
 from jaxphys.core.rotations import matrix_to_quaternion
 from jaxphys.core.spectral import polar_rotation
 from jaxphys.core.splats import Splats
@@ -103,7 +104,10 @@ def deform(
     covariances = jnp.moveaxis(algebra.matmul_transpose(A, A), -1, 0)
     # Colours that look the same from all sides need no rotation, and no decomposition.
     turns = gaussians.harmonics.shape[1] > 1
-    rotations = jnp.moveaxis(polar_rotation(F), -1, 0) if turns else None
+    rotations = None
+    if turns:
+        with part("turned view directions"):
+            rotations = jnp.moveaxis(polar_rotation(F), -1, 0)
     rgb = view_colours(gaussians.harmonics, means, camera_position, rotations)
     if colours is not None:
         rgb = regularise(rgb, colours)

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from jaxphys.core.program import part
 from jaxphys.core.splats import Splats
 from jaxphys.gaussians.colour import regularise
 from jaxphys.gaussians.gaussians import Gaussians, concatenate, to_splats
@@ -34,14 +35,16 @@ def frame_splats(look: Look, frame: Frame, eye: Array) -> Splats:
     frame.check()
     splats = deform(look.gaussians, *frame.carried(), eye)
     if look.colours is not None:
-        parts = [
-            regularise(splats.colours[start:stop], limits)
-            for (start, stop), limits in zip(look.objects, look.colours, strict=True)
-        ]
-        splats = splats._replace(colours=jnp.concatenate(parts))
+        with part("colour regularisation"):
+            regular = [
+                regularise(splats.colours[start:stop], limits)
+                for (start, stop), limits in zip(look.objects, look.colours, strict=True)
+            ]
+            splats = splats._replace(colours=jnp.concatenate(regular))
     if look.still is not None:
-        rest = to_splats(look.still, eye)
-        splats = jax.tree.map(lambda *both: jnp.concatenate(both), splats, rest)
+        with part("still Gaussians"):
+            rest = to_splats(look.still, eye)
+            splats = jax.tree.map(lambda *both: jnp.concatenate(both), splats, rest)
     return splats
 
 

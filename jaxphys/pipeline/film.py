@@ -11,6 +11,7 @@ import numpy as np
 from jax import Array
 from tqdm import tqdm
 
+from jaxphys.core.program import part
 from jaxphys.mpm.motion import Frame
 from jaxphys.pipeline.backdrop import backdrop
 from jaxphys.pipeline.draw import draw, frame_splats
@@ -66,16 +67,17 @@ def picture(
     """
     behind = jnp.array(surroundings.background, frame.position.dtype)
     if surroundings.floor is not None:
-        behind = backdrop(
-            camera,
-            frame.carried()[0],
-            middle,
-            extent,
-            height=surroundings.floor,
-            colour=surroundings.floor_colour,
-            shadow=surroundings.shadow,
-            background=surroundings.background,
-        )
+        with part("drawn floor"):
+            behind = backdrop(
+                camera,
+                frame.carried()[0],
+                middle,
+                extent,
+                height=surroundings.floor,
+                colour=surroundings.floor_colour,
+                shadow=surroundings.shadow,
+                background=surroundings.background,
+            )
     image = draw(look, frame, camera, background=behind, capacity=capacity)
     return jnp.round(255 * jnp.clip(image.colour, 0, 1)).astype(jnp.uint8), image.required
 

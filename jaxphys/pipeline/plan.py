@@ -1,0 +1,242 @@
+"""What a run's programs hold and nothing else: read off the programs themselves, before they run.
+
+Parts are marked where they are traced (`core.program.part`); the plan traces the step and the
+picture of the very simulation that would run, and finds the marks.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxphys.core.program import parts
+from jaxphys.gaussians.gaussians import Gaussians, from_points, transform
+from jaxphys.mpm.materials import MATERIALS
+from jaxphys.mpm.step import step
+from jaxphys.mpm.time_step import largest_stable_dt
+from jaxphys.pipeline.film import picture, surroundings_of
+from jaxphys.render.camera import orbit
+from jaxphys.scene.build import Built, build
+from jaxphys.scene.place import rotation_matrix
+from jaxphys.scene.scene import Object, Scene
+from jaxphys.scene.source import load_object
+
+# Measured on two x86-64 cores with AVX-512, float32; for orientation only.
+PARTICLE_STEPS_A_SECOND = 2.2e6
+NODE_STEPS_A_SECOND = 2e8
+PIXELS_A_SECOND = 6e6
+SPLATS_A_SECOND = 4e5
+COMPILE_SECONDS = 12.0
+
+# Optional parts that any program may hold: why it does, and why not. Laws and boundaries, of which
+# there are more, say themselves what they are.
+OPTIONAL: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "gravity": ("the scene has it", "is zero"),
+        "eigen-decomposition": ("a law works on principal strains", "no law needs one"),
+        "polar rotation": (
+            "a law or turned colours need the rotation of F",
+            "neither laws nor colours need it",
+        ),
+        "return map": ("a law is plastic", "no law is plastic"),
+        "history": ("a law remembers", "no law remembers"),
+        "second deformation gradient": (
+            "plastic flow must be seen in the splats",
+            "splats follow the gradient that the laws see",
+        ),
+        "compensated sums": (
+            "float32 would round small steps away",
+            "float64 has digits to spare",
+        ),
+        "contact": (
+            "a boundary pushes particles at their distance",
+            "no boundary touches particles",
+        ),
+        "friction": ("a boundary is rough", "no boundary is rough"),
+        "turned view directions": (
+            "harmonics depend on them",
+            "colours are the same from everywhere",
+        ),
+        "colour regularisation": ("the scene asks for it", "switched off"),
+        "drawn floor": ("the scene asks for it", "the scene asks for none"),
+        "still Gaussians": ("some are drawn that do not move", "all of them move"),
+    }
+)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What `jaxphys plan` prints.
+
+    Attributes:
+        included: part of the program -> why.
+        left_out: part -> why.
+        particles, gaussians, grid: sizes.
+        substep: time step [s]; `bounds` [s] and `reason`: what limits it.
+        steps_per_frame, frames, steps: counts.
+        memory: bytes by what they hold.
+        seconds: estimate by stage, on two CPU cores.
+    """
+
+    included: dict[str, str]
+    left_out: dict[str, str]
+    particles: int
+    gaussians: int
+    grid: tuple[int, int, int]
+    substep: float
+    bounds: dict[str, float]
+    reason: str
+    steps_per_frame: int
+    frames: int
+    steps: int
+    memory: dict[str, int]
+    seconds: dict[str, float]
+
+
+def ball(count: int = 4000) -> Gaussians:
+    """A grey ball of unit diameter on whose surface `count` Gaussians lie (a Fibonacci
+    lattice).
+    """
+    index = np.arange(count) + 0.5
+    z = 1 - 2 * index / count
+    turn = np.pi * (1 + 5**0.5) * index
+    ring = np.sqrt(1 - z**2)
+    points = 0.5 * np.stack([ring * np.cos(turn), ring * np.sin(turn), z], axis=1)
+    size = 0.5 * np.sqrt(np.pi / count)
+    return from_points(points.astype(np.float32), np.array([0.6, 0.6, 0.6]), size)
+
+
+def stand_in(thing: Object, where: str) -> Gaussians:
+    """A ball for an object that has no source yet, inside its `area` if it has one."""
+    if thing.area is None:
+        return ball()
+    low, high = np.array(thing.area[0::2]), np.array(thing.area[1::2])
+    # The area is that of the turned source.
+    centre = rotation_matrix(thing, where).T @ ((low + high) / 2)
+    diameter = 0.9 * float(np.min(high - low))
+    return transform(ball(), scale=diameter, translation=centre)
+
+
+def program_parts(scene: Scene, built: Built) -> dict[str, int]:
+    """Marked parts of the step and of the picture, with the number of primitives of each."""
+    simulation, look = built
+    state = simulation.state
+    found = parts(partial(step, simulation.config), simulation.model, state, simulation.dt)
+    dtype = state.position.dtype
+    camera = orbit((0.0, 0.0, 0.0), 1.0, 0.0, 0.0, width=scene.width, height=scene.height)
+    paint = partial(picture, surroundings=surroundings_of(scene), capacity=1024)
+    frame = jax.eval_shape(lambda s: s.frame(s.state, s.carriers), simulation)
+    shown = parts(paint, look, frame, camera, jnp.zeros(2, dtype), jnp.ones((), dtype))
+    return {name: found.get(name, 0) + shown.get(name, 0) for name in {**found, **shown}}
+
+
+def make_plan(scene: Scene, beside: Path | None = None) -> Plan:
+    """The plan of a scene; a ball stands in for each object that has no source.
+
+    Args:
+        scene: to be planned.
+        beside: where relative sources are looked up first.
+    """
+    objects = tuple(
+        stand_in(thing, f"objects[{i}]")
+        if thing.source is None
+        else load_object(thing, beside, scene.seed + i, f"objects[{i}]")
+        for i, thing in enumerate(scene.objects)
+    )
+    return describe(scene, build(scene, *objects))
+
+
+def _facts(scene: Scene, built: Built) -> tuple[dict[str, str], dict[str, str]]:
+    """Parts in and parts left out, each with the reason."""
+    found = program_parts(scene, built)
+    included, left_out = {}, {}
+    laws = {f"law {material.law.name}" for material in MATERIALS.values()}
+    for name in sorted(laws | {name for name in found if name.startswith("law ")}):
+        if name in found:
+            included[name] = "an object is made of it"
+        else:
+            left_out[name] = "no object is made of it"
+    for name in sorted(name for name in found if name.startswith("boundary ")):
+        included[name] = "the scene lists it"
+    if not any(name.startswith("boundary ") for name in found):
+        left_out["boundaries"] = "the scene lists none"
+    for name, (why, why_not) in OPTIONAL.items():
+        if name in found:
+            included[name] = why
+        else:
+            left_out[name] = why_not
+    filled = built.simulation.config.particles > len(built.simulation.carriers)
+    if filled:
+        included["filling"] = "hollow objects get particles inside"
+    else:
+        left_out["filling"] = "every particle carries a Gaussian"
+    for name in sorted({thing.material for thing in scene.objects}):
+        included[f"material {name}"] = MATERIALS[name].description
+    return included, left_out
+
+
+def describe(scene: Scene, built: Built) -> Plan:
+    """The plan of a scene that is built already."""
+    simulation, look = built
+    included, left_out = _facts(scene, built)
+    bounds = largest_stable_dt(simulation.config, simulation.model, simulation.state)
+    reason = bounds.reason if scene.substep is None else "the scene's own substep"
+    particles, drawn = simulation.config.particles, look.gaussians.count
+    nodes = int(np.prod(simulation.config.grid.shape))
+    steps = simulation.steps * (scene.frames - 1)
+    limits = {name: float(getattr(bounds, name)) for name in bounds._fields if name != "reason"}
+    pixels = scene.width * scene.height
+    state = sum(leaf.nbytes for leaf in jax.tree.leaves(simulation.state))
+    model = sum(leaf.nbytes for leaf in jax.tree.leaves(simulation.model))
+    return Plan(
+        included=included,
+        left_out=left_out,
+        particles=particles,
+        gaussians=drawn,
+        grid=simulation.config.grid.shape,
+        substep=simulation.dt,
+        bounds=limits,
+        reason=reason,
+        steps_per_frame=simulation.steps,
+        frames=scene.frames,
+        steps=steps,
+        memory={
+            "state and parameters": state + model,
+            "grid": 16 * nodes,
+            "transfers": 27 * 16 * particles,
+            "motion": 48 * drawn * scene.frames,
+            "picture": 32 * pixels,
+        },
+        seconds={
+            "compile": COMPILE_SECONDS,
+            "simulate": steps * (particles / PARTICLE_STEPS_A_SECOND + nodes / NODE_STEPS_A_SECOND),
+            "render": scene.frames * (pixels / PIXELS_A_SECOND + drawn / SPLATS_A_SECOND),
+        },
+    )
+
+
+def as_text(plan: Plan, as_json: bool = False) -> str:
+    """The plan for people, or as JSON."""
+    if as_json:
+        return json.dumps(asdict(plan), indent=2)
+    lines = ["in:"]
+    lines += [f"  {name}: {why}" for name, why in plan.included.items()]
+    lines += ["left out:"]
+    lines += [f"  {name}: {why}" for name, why in plan.left_out.items()]
+    grid = " x ".join(str(side) for side in plan.grid)
+    lines += [
+        f"particles: {plan.particles} ({plan.gaussians} carry Gaussians), grid {grid}",
+        f"time step: {plan.substep:.3e} s, limited by {plan.reason}",
+        *(f"  bound {name}: {value:.3e} s" for name, value in plan.bounds.items()),
+        f"steps: {plan.steps_per_frame} a frame, {plan.frames} frames, {plan.steps} in all",
+        "memory: " + ", ".join(f"{k} {v / 2**20:.1f} MiB" for k, v in plan.memory.items()),
+        "time on two cores, roughly: "
+        + ", ".join(f"{name} {seconds:.0f} s" for name, seconds in plan.seconds.items()),
+    ]
+    return "\n".join(lines)
