@@ -4,7 +4,7 @@ from .adjoint import Checkpointed as Checkpointed
 from .adjoint import Plain as Plain
 from .boundaries import GridBoundary as GridBoundary
 from .fracture import number_of_pieces as number_of_pieces
-from .frames import frame_step as frame_step
+from .frames import advance_frame as advance_frame
 from .frames import rollout_frames as rollout_frames
 from .grid import Grid as Grid
 from .law import Law as Law

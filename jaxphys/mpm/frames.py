@@ -1,5 +1,7 @@
 """From a simulation to its motion: as one differentiable program, or frame by frame."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 
@@ -59,15 +61,11 @@ def rollout_frames(simulation: Simulation, frames: int, *, adjoint: Adjoint = PL
     return Motion(*parts, simulation.carriers)
 
 
-def frame_step(config: Config):
-    """A compiled `(model, state, dt, steps) -> state`, for callers who look at every frame.
+@partial(jax.jit, static_argnames="config")
+def advance_frame(config: Config, model: Model, state: State, dt, steps) -> State:
+    """The state a frame later, for callers who look at every frame; compiled once a program.
 
     `steps` is a number, not a part of the program. After a failure the state of the last good frame
     comes back with the failure's status.
     """
-
-    @jax.jit
-    def advance(model: Model, state: State, dt, steps) -> State:
-        return rollout(config, model, state, dt=dt, steps=steps)
-
-    return advance
+    return rollout(config, model, state, dt=dt, steps=steps)

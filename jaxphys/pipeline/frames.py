@@ -7,6 +7,7 @@ Film, checkpoint, metrics and whoever comes after consume the same iterator.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import jax
@@ -15,7 +16,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.mpm.fracture import number_of_pieces
-from jaxphys.mpm.frames import frame_step
+from jaxphys.mpm.frames import advance_frame
 from jaxphys.mpm.motion import Frame, Motion, join
 from jaxphys.mpm.rollout import check
 from jaxphys.mpm.simulation import Simulation
@@ -112,17 +113,17 @@ def frames(
         steps = simulation.steps * 2**refinement
         return jnp.asarray(simulation.frame_time / steps, dtype), jnp.asarray(steps, jnp.int32)
 
+    advance = partial(advance_frame, simulation.config, simulation.model)
     with timing.stage("simulate"), timing.compiling("simulate"):
-        advance = (
-            frame_step(simulation.config).lower(simulation.model, state, *arguments(0)).compile()
-        )
+        dt, steps = arguments(0)
+        jax.block_until_ready(advance(state, dt, 0 * steps))
     refinements = 0 if simulation.given_substep is not None else REFINEMENTS
     while True:
         number += 1
         with timing.stage("simulate"):
             before = state
             for refinement in range(refinements + 1):
-                state = advance(simulation.model, before, *arguments(refinement))
+                state = advance(before, *arguments(refinement))
                 if int(state.status.code) == OK:
                     break
             check(state.status, number)

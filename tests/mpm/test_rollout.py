@@ -8,7 +8,7 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm import rollout as rollouts
-from jaxphys.mpm.frames import frame_step, rollout_frames
+from jaxphys.mpm.frames import advance_frame, rollout_frames
 from jaxphys.mpm.rollout import SimulationError, check, rollout
 from jaxphys.mpm.sorting import cell_order, inverse_order
 from jaxphys.mpm.state import LEFT_GRID
@@ -62,13 +62,13 @@ def test_one_compilation_and_one_trace_of_the_step(monkeypatch):
     assert len(traces) == 1
 
 
-def test_frame_step_compiles_once_for_any_number_of_steps():
+def test_a_frame_compiles_once_for_any_number_of_steps():
     config, model, state = block()
     expected = jax.jit(partial(rollout, config, steps=6))(model, state, dt=DT)
-    advance = frame_step(config)
+    before = advance_frame._cache_size()
     for steps in (4, 2):
-        state = advance(model, state, DT, steps)
-    assert advance._cache_size() == 1
+        state = advance_frame(config, model, state, DT, steps)
+    assert advance_frame._cache_size() == before + 1
     np.testing.assert_allclose(state.position, expected.position, atol=1e-14)
     check(state.status, 1)
 
