@@ -8,6 +8,8 @@ nothing, or to twice as much. With the rest carried, the error no longer grows w
 from jax import Array
 from jax.lax import stop_gradient
 
+from jaxphys.core.program import part
+
 
 def add(total: Array, residual: Array | None, term: Array) -> tuple[Array, Array | None]:
     """`total + term` and what rounding left out of it: total plus residual is the sum.
@@ -22,8 +24,9 @@ def add(total: Array, residual: Array | None, term: Array) -> tuple[Array, Array
     """
     if residual is None:
         return total + term, None
-    term = term + stop_gradient(residual)
-    result = total + term
-    total, term, rounded = stop_gradient((total, term, result))
-    taken = rounded - total
-    return result, (total - (rounded - taken)) + (term - taken)
+    with part("compensated sums"):
+        term = term + stop_gradient(residual)
+        result = total + term
+        total, term, rounded = stop_gradient((total, term, result))
+        taken = rounded - total
+        return result, (total - (rounded - taken)) + (term - taken)

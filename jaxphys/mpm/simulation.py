@@ -20,7 +20,7 @@ from jaxphys.mpm.substep import choose_substep
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=("model", "state", "order", "carriers"),
-    meta_fields=("config", "counts", "dt", "steps", "given_substep", "unsafe"),
+    meta_fields=("config", "counts", "dt", "steps", "given_substep"),
 )
 @dataclass(frozen=True)
 class Simulation:
@@ -37,7 +37,6 @@ class Simulation:
         dt: time step [s].
         steps: time steps a frame.
         given_substep: the largest step that was asked for [s], or None: as the bounds allow.
-        unsafe: whether `given_substep` may break the bounds.
     """
 
     model: Model
@@ -49,7 +48,6 @@ class Simulation:
     dt: float
     steps: int
     given_substep: float | None = None
-    unsafe: bool = False
 
     @property
     def frame_time(self) -> float:
@@ -165,7 +163,6 @@ class Simulation:
             self.state,
             self.frame_time,
             self.given_substep,
-            unsafe=self.unsafe,
         )
         return replace(self, dt=dt, steps=steps)
 

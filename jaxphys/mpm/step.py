@@ -5,6 +5,7 @@ from jax import Array
 
 from jaxphys.core import algebra, compensated
 from jaxphys.core.errors import InputError
+from jaxphys.core.program import part
 
 from .boundaries import GridBoundary
 from .grid import node_coordinates
@@ -73,8 +74,9 @@ def step(config: Config, model: Model, state: State, dt) -> State:
     F, F_rest = compensated.add(F, carried.deformation, dt * algebra.matmul(C, F))
     total, total_rest = state.total, None
     if total is not None:
-        change = dt * algebra.matmul(C, total)
-        total, total_rest = compensated.add(total, carried.total, change)
+        with part("second deformation gradient"):
+            change = dt * algebra.matmul(C, total)
+            total, total_rest = compensated.add(total, carried.total, change)
     residual = Residual(position_rest, F_rest, total_rest, time_rest)
     return State(
         position=position,
@@ -99,11 +101,13 @@ def apply_laws(config: Config, model: Model, state: State) -> tuple[Array, Array
             memory = jnp.zeros((0, stop - start), state.position.dtype)
         else:
             memory = state.history[:kept, start:stop]
-        F, stress, memory = law.update(parameters, state.deformation[:, :, start:stop], memory)
+        with part(f"law {law.name}"):
+            F, stress, memory = law.update(parameters, state.deformation[:, :, start:stop], memory)
         gradients.append(F)
         stresses.append(stress)
         if state.history is not None:
-            histories.append(jnp.concatenate([memory, state.history[kept:, start:stop]]))
+            with part("history"):
+                histories.append(jnp.concatenate([memory, state.history[kept:, start:stop]]))
     return _join(gradients), _join(stresses), _join(histories) if histories else None
 
 
@@ -124,8 +128,9 @@ def update_grid(
     filled = mass > least
     rows = rows / jnp.where(filled, mass, 1.0)
     if model.gravity is not None:
-        # All four columns at once: XLA would otherwise pad each row that a transfer reads.
-        rows = rows + dt * jnp.concatenate([model.gravity, jnp.zeros_like(model.gravity[:1])])
+        with part("gravity"):
+            # All four columns at once: XLA would otherwise pad each row that a transfer reads.
+            rows = rows + dt * jnp.concatenate([model.gravity, jnp.zeros_like(model.gravity[:1])])
     rows = jnp.where(filled, rows, 0.0)
     boundaries = [b for b in model.boundaries if isinstance(b, GridBoundary)]
     if not boundaries:

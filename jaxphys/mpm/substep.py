@@ -18,8 +18,6 @@ def choose_substep(
     state: State,
     frame_time: float,
     substep: float | None = None,
-    *,
-    unsafe: bool = False,
 ) -> tuple[float, int, StepBounds]:
     """The time step [s], steps a frame, and the bounds.
 
@@ -27,10 +25,9 @@ def choose_substep(
         config, model, state: what is stepped, all numbers concrete.
         frame_time: between frames [s].
         substep: at most so long [s]; None: as long as the bounds allow.
-        unsafe: take `substep` beyond the bounds.
 
     Raises:
-        InputError: `substep` breaks the bounds and is not declared unsafe; the message gives the
+        InputError: `substep` breaks the bounds and `Config.check_step` is on; the message gives the
             largest safe one.
     """
     bounds = largest_stable_dt(config, model, state)
@@ -38,7 +35,7 @@ def choose_substep(
     if substep is not None:
         wanted = substep
         try:
-            validate_dt(wanted, bounds, unsafe=unsafe)
+            validate_dt(wanted, bounds, unsafe=not config.check_step)
         except InputError as error:
             raise InputError(f"substep: {error}, or set unsafe_substep") from None
     if frame_time / wanted > MOST_STEPS:

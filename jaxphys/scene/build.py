@@ -166,7 +166,7 @@ def solver_parts(
         volume=volume,
         parameters={name: value[arrangement] for name, value in parameters.items()},
         # Gravity of zero is left out of the program.
-        gravity=jnp.asarray(scene.gravity, dtype),
+        gravity=jnp.asarray(scene.gravity, dtype) if any(scene.gravity) else None,
         boundaries=boundaries,
         rest=jnp.asarray(positions.T, dtype) if rest else None,
     )
@@ -206,7 +206,6 @@ def build(
         state,
         scene.seconds_per_frame,
         scene.substep,
-        unsafe=scene.unsafe_substep,
     )
     starts = np.cumsum([0, *(len(part.positions) for part in parts)])[:-1]
     carriers = [start + np.arange(part.carriers) for start, part in zip(starts, parts, strict=True)]
@@ -220,6 +219,5 @@ def build(
         dt=dt,
         steps=steps,
         given_substep=scene.substep,
-        unsafe=scene.unsafe_substep,
     )
     return Built(simulation, look_of(placed, scene.regularise_colours))
