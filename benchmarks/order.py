@@ -33,10 +33,10 @@ EXPECTED = {
 
 def build(name: str, cells: int, dtype: str):
     """The problem on a grid with dx = size / cells; the vortex and the cube are sized 1 m."""
-    from benchmarks.problems.bar import Bar, free_bar, held_bar
-    from benchmarks.problems.column import Column, sudden_column
-    from benchmarks.problems.cube import Cube, free_cube
-    from benchmarks.problems.vortex import Vortex, plate, vortex
+    from jaxphys.problems.bar import Bar, free_bar, held_bar
+    from jaxphys.problems.column import Column, sudden_column
+    from jaxphys.problems.cube import Cube, free_cube
+    from jaxphys.problems.vortex import Vortex, plate, vortex
 
     spin = Vortex(amplitude=0.0, spin=1.0)
     # float32 holds a displacement of 1e-5 of the body no better than to a percent.
@@ -57,7 +57,7 @@ def build(name: str, cells: int, dtype: str):
 def prepare(name: str, cells: int, dtype: str) -> Prepared:
     """Compiles the problem, and solves it and the next coarser one to learn the order."""
     jax.config.update("jax_enable_x64", True)
-    from benchmarks.problems.discrete import displacement_errors, solve
+    from jaxphys.problems.discrete import displacement_errors, solve
 
     problem = build(name, cells, dtype)
     start = time.perf_counter()

@@ -11,9 +11,9 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from benchmarks.problems.bar import line_points
-from benchmarks.problems.discrete import Problem, Room, discretise, held_up_to, steps_for
 from jaxphys.mpm.elasticity import HENCKY
+from jaxphys.problems.bar import line_points
+from jaxphys.problems.discrete import Problem, Room, discretise, held_up_to, steps_for
 
 
 @jax.tree_util.register_dataclass

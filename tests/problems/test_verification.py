@@ -12,23 +12,24 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from benchmarks.problems.bar import Bar, free_bar, held_bar, line_room
-from benchmarks.problems.column import Column, sudden_column
-from benchmarks.problems.cube import Cube, cube_room, free_cube
-from benchmarks.problems.discrete import (
+from jaxphys.mpm.time_step import largest_stable_dt
+from jaxphys.problems.bar import Bar, free_bar, held_bar, line_room
+from jaxphys.problems.column import Column, sudden_column
+from jaxphys.problems.cube import Cube, cube_room, free_cube
+from jaxphys.problems.discrete import (
     displacement_errors,
     energy,
     observed_order,
     solve,
     volume_gain,
 )
-from benchmarks.problems.kinematics import (
+from jaxphys.problems.kinematics import (
     body_acceleration,
     deformation_gradient,
     neo_hookean_stress,
 )
-from benchmarks.problems.particle import Particle, breathing, log_stretch_of
-from benchmarks.problems.vortex import (
+from jaxphys.problems.particle import Particle, breathing, log_stretch_of
+from jaxphys.problems.vortex import (
     INNER,
     OUTER,
     Vortex,
@@ -37,7 +38,6 @@ from benchmarks.problems.vortex import (
     vortex,
     vortex_room,
 )
-from jaxphys.mpm.time_step import largest_stable_dt
 
 LINE = line_room(64)
 PLANE = vortex_room(1 / 24)

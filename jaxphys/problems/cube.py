@@ -13,8 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks.problems.discrete import BodyForce, Problem, Room, discretise, steps_for
 from jaxphys.mpm.elasticity import NEO_HOOKEAN
+from jaxphys.problems.discrete import BodyForce, Problem, Room, discretise, steps_for
 
 PHASES = (0.0, 2.0 / 3.0, 4.0 / 3.0)
 NEWTON_STEPS = 6

@@ -13,8 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks.problems.discrete import Problem, Room, discretise, held_up_to, steps_for
 from jaxphys.mpm.elasticity import HENCKY
+from jaxphys.problems.discrete import Problem, Room, discretise, held_up_to, steps_for
 
 
 @jax.tree_util.register_dataclass

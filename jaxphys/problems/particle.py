@@ -14,9 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks.problems.discrete import Problem, Room, discretise, held_up_to
 from jaxphys.mpm.elasticity import HENCKY
 from jaxphys.mpm.state import State
+from jaxphys.problems.discrete import Problem, Room, discretise, held_up_to
 
 
 @jax.tree_util.register_dataclass

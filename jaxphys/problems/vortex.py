@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks.problems.discrete import BodyForce, Planar, Problem, Room, discretise, steps_for
 from jaxphys.mpm.elasticity import NEO_HOOKEAN
+from jaxphys.problems.discrete import BodyForce, Planar, Problem, Room, discretise, steps_for
 
 INNER, OUTER = 0.75, 1.25
 

@@ -16,13 +16,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from benchmarks.problems.kinematics import deformation_gradient, velocity
 from jaxphys.core import algebra
 from jaxphys.mpm.boundaries import FOREVER, GridBoundary, HalfSpace
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.law import Law
 from jaxphys.mpm.state import Config, Model, State, initial_state
 from jaxphys.mpm.step import step
+from jaxphys.problems.kinematics import deformation_gradient, velocity
 
 
 class Room(NamedTuple):
