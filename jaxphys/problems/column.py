@@ -13,7 +13,8 @@ from jax import Array
 
 from jaxphys.mpm.elasticity import HENCKY
 from jaxphys.problems.bar import line_points
-from jaxphys.problems.discrete import Problem, Room, discretise, held_up_to, steps_for
+from jaxphys.problems.discrete import Discretisation, Room, discretise, held_up_to, steps_for
+from jaxphys.problems.problem import Problem
 
 
 @jax.tree_util.register_dataclass
@@ -80,7 +81,7 @@ def sudden_column(
     periods: float = 0.5,
     room: Room | None = None,
     dtype=jnp.float64,
-) -> Problem:
+) -> Discretisation:
     """The column on nodes that are held by a sticky half-space, from the moment gravity appears."""
     spacing = column.height / cells
     dt, steps = steps_for(periods * column.period, courant, spacing, column.wave_speed)
@@ -101,3 +102,15 @@ def sudden_column(
         room=room,
         dtype=dtype,
     )
+
+
+SUDDEN_COLUMN = Problem(
+    name="sudden-column",
+    source="d'Alembert's solution of a column under gravity that is switched on at once",
+    # float32 does not see the displacement that 1e-3 m/s^2 makes.
+    build=lambda cells, dtype: sudden_column(
+        Column(gravity=1e-3 if jnp.dtype(dtype) == jnp.float64 else 1.0), cells, dtype=dtype
+    ),
+    ladder=(8, 16, 32, 64),
+    order=1,
+)

@@ -14,7 +14,8 @@ import numpy as np
 from jax import Array
 
 from jaxphys.mpm.elasticity import NEO_HOOKEAN
-from jaxphys.problems.discrete import BodyForce, Problem, Room, discretise, steps_for
+from jaxphys.problems.discrete import BodyForce, Discretisation, Room, discretise, steps_for
+from jaxphys.problems.problem import Problem
 
 PHASES = (0.0, 2.0 / 3.0, 4.0 / 3.0)
 NEWTON_STEPS = 6
@@ -82,7 +83,7 @@ def free_cube(
     courant: float = 0.4,
     room: Room | None = None,
     dtype=jnp.float64,
-) -> Problem:
+) -> Discretisation:
     """The cube on cells of 1 / cells [m] with eight particles each, free on all faces."""
     spacing = 1.0 / cells
     dt, steps = steps_for(periods * cube.period, courant, spacing, cube.wave_speed)
@@ -112,3 +113,12 @@ def free_cube(
 def cube_room(cells: int) -> Room:
     """Room for the cube on this many cells, and so for all coarser levels, of 6 cells or more."""
     return Room((2 * cells) ** 3, (cells + 9 + cells // 10,) * 3)
+
+
+FREE_CUBE = Problem(
+    name="cube",
+    source="manufactured, after Wallstedt and Guilkey (2008), J. Comput. Phys. 227",
+    build=lambda cells, dtype: free_cube(Cube(), cells, dtype=dtype),
+    ladder=(6, 12, 24),
+    order=2,
+)

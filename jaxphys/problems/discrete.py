@@ -36,10 +36,11 @@ class Room(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Problem:
-    """A problem with a known answer, ready to be solved. Lengths in units of `spacing`.
+class Discretisation:
+    """A problem with a known answer on a grid, ready to be solved. Lengths in units of `spacing`.
 
     Attributes:
+        truth: what the answer comes from: `truth.motion(X (3, ...), t)` [m] at any time [s].
         config, model, state: what `step` takes.
         dt: [s]; steps: how many.
         exact: (3, N) positions after the last step.
@@ -48,6 +49,7 @@ class Problem:
         count: how many particles are the problem's.
     """
 
+    truth: object
     config: Config
     model: Model
     state: State
@@ -147,14 +149,14 @@ def discretise(
     staggered: bool = True,
     room: Room | None = None,
     dtype=jnp.float64,
-) -> Problem:
+) -> Discretisation:
     """Particles at `points` (N, 3) [m] with rest `volume` (N,) or () [m^3] that start on a motion.
 
     Args:
         truth: a pytree with `motion`, `youngs` [Pa] and `density` [kg/m^3].
         nodes: of the grid; `room` may give more.
         origin: (3,) where the motion's origin sits on the grid [dx].
-        spacing: dx [m]; scale: see `Problem`; gravity: [m/s^2].
+        spacing: dx [m]; scale: see `Discretisation`; gravity: [m/s^2].
         boundaries: in units of dx.
         staggered: whether velocities start at -dt/2 rather than at 0.
     """
@@ -187,9 +189,8 @@ def discretise(
     )
     origin = jnp.asarray(origin, jnp.float64)
     state = initial_state(config, x / spacing + origin, v / spacing, F, affine, dtype=dtype)
-    return Problem(
-        config, model, state, dt, steps, (exact / spacing + origin).T, spacing, scale, count
-    )
+    exact = (exact / spacing + origin).T
+    return Discretisation(truth, config, model, state, dt, steps, exact, spacing, scale, count)
 
 
 @partial(jax.jit, static_argnums=0)
@@ -201,7 +202,7 @@ def _advance(config, model, state, dt, steps, keep):
     return jax.lax.fori_loop(0, steps, body, state)
 
 
-def solve(problem: Problem, keep_affine: float = 1.0, steps: int | None = None) -> State:
+def solve(problem: Discretisation, keep_affine: float = 1.0, steps: int | None = None) -> State:
     """The state after all steps, or after `steps`; its status says whether they are sound.
 
     keep_affine: what part of C survives a step. 0 makes it a particle-in-cell method that forgets
@@ -213,7 +214,7 @@ def solve(problem: Problem, keep_affine: float = 1.0, steps: int | None = None) 
     return _advance(problem.config, problem.model, problem.state, problem.dt, steps, keep)
 
 
-def displacement_errors(problem: Problem, state: State) -> tuple[float, float]:
+def displacement_errors(problem: Discretisation, state: State) -> tuple[float, float]:
     """(L2, largest) error of the positions over `problem.scale`; infinite if the run failed.
 
     L2 is the root of the volume-weighted mean square over particles.
@@ -227,13 +228,13 @@ def displacement_errors(problem: Problem, state: State) -> tuple[float, float]:
     return float(np.sqrt(mean)), float(np.sqrt(square.max()))
 
 
-def volume_gain(problem: Problem, state: State) -> float:
+def volume_gain(problem: Discretisation, state: State) -> float:
     """Relative change of the total volume, sum V0 (J - 1) / sum V0."""
     J = np.linalg.det(np.moveaxis(np.asarray(state.deformation), -1, 0))
     return float(np.average(J - 1, weights=np.asarray(problem.model.volume)))
 
 
-def energy(problem: Problem, state: State) -> float:
+def energy(problem: Discretisation, state: State) -> float:
     """Kinetic energy (with that of the affine parts, m D |C|^2 / 2) and stored energy.
 
     In units of kg dx^2/s^2; of one law for all particles; gravity's potential is not in it.

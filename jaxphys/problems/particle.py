@@ -16,7 +16,8 @@ from jax import Array
 
 from jaxphys.mpm.elasticity import HENCKY
 from jaxphys.mpm.state import State
-from jaxphys.problems.discrete import Problem, Room, discretise, held_up_to
+from jaxphys.problems.discrete import Discretisation, Room, discretise, held_up_to
+from jaxphys.problems.problem import Problem
 
 
 @jax.tree_util.register_dataclass
@@ -69,7 +70,8 @@ def breathing(
     steps: int,
     staggered: bool = True,
     room: Room | None = None,
-) -> Problem:
+    dtype=jnp.float64,
+) -> Discretisation:
     """The particle alone on a small grid, not in the middle of a cell."""
     return discretise(
         particle,
@@ -83,12 +85,35 @@ def breathing(
         dt=dt,
         steps=steps,
         scale=particle.spacing,
-        boundaries=(held_up_to(-1e9, jnp.float64),),
+        boundaries=(held_up_to(-1e9, dtype),),
         staggered=staggered,
         room=room,
+        dtype=dtype,
     )
 
 
 def log_stretch_of(state: State) -> float:
     """log F_11 of the particle, to compare with `Particle.log_stretch`."""
     return float(jnp.log(state.deformation[0, 0, 0]))
+
+
+def _log_stretch_error(problem: Discretisation, state: State) -> float:
+    truth = problem.truth
+    expected = float(truth.log_stretch(problem.dt * problem.steps))
+    return abs(log_stretch_of(state) - expected) / truth.amplitude
+
+
+def _small(steps: int, dtype) -> Discretisation:
+    particle = Particle(amplitude=1e-4)
+    return breathing(particle, 1.3 * particle.period / steps, steps, dtype=dtype)
+
+
+BREATHING_PARTICLE = Problem(
+    name="particle",
+    source="harmonic oscillator that one particle's APIC transfers are with Hencky's law",
+    build=_small,
+    ladder=(50, 100, 200),
+    order=2,
+    resolution="steps",
+    norm=_log_stretch_error,
+)

@@ -15,7 +15,8 @@ import numpy as np
 from jax import Array
 
 from jaxphys.mpm.elasticity import NEO_HOOKEAN
-from jaxphys.problems.discrete import BodyForce, Planar, Problem, Room, discretise, steps_for
+from jaxphys.problems.discrete import BodyForce, Discretisation, Planar, Room, discretise, steps_for
+from jaxphys.problems.problem import Problem
 
 INNER, OUTER = 0.75, 1.25
 
@@ -149,7 +150,7 @@ def vortex(
     share: float = 1.0,
     room: Room | None = None,
     dtype=jnp.float64,
-) -> Problem:
+) -> Discretisation:
     """One layer of particles in plane strain; `share` of the body force is applied."""
     points, areas = annulus_points(spacing)
     return _planar(truth, points, areas, spacing, duration, courant, share, room, dtype)
@@ -164,7 +165,7 @@ def plate(
     share: float = 1.0,
     room: Room | None = None,
     dtype=jnp.float64,
-) -> Problem:
+) -> Discretisation:
     """A square plate of `side` [m] in plane strain about the axis; `truth.amplitude` is 0.
 
     With share=1 the centripetal force is given, and the rotation is exact for any stiffness; with
@@ -176,7 +177,7 @@ def plate(
     return _planar(truth, points, area, spacing, duration, courant, share, room, dtype)
 
 
-def _planar(truth, points, areas, spacing, duration, courant, share, room, dtype) -> Problem:
+def _planar(truth, points, areas, spacing, duration, courant, share, room, dtype) -> Discretisation:
     fastest = abs(truth.amplitude) * np.pi * truth.rate + abs(truth.spin) * OUTER
     dt, steps = steps_for(duration, courant, spacing, truth.wave_speed + fastest)
     middle = half_width(spacing) if room is None else room.nodes[0] // 2
@@ -201,7 +202,7 @@ def _planar(truth, points, areas, spacing, duration, courant, share, room, dtype
     )
 
 
-def angular_momentum(problem: Problem, state) -> np.ndarray:
+def angular_momentum(problem: Discretisation, state) -> np.ndarray:
     """Total angular momentum (3,) about the grid's corner, in units of kg dx^2/s.
 
     The sum of x_p x m v_p and of the moment m D C of the affine part, D = dx^2 / 4 for quadratic
@@ -210,3 +211,21 @@ def angular_momentum(problem: Problem, state) -> np.ndarray:
     x, v, C = (np.asarray(a) for a in (state.position, state.velocity, state.affine))
     spin = 0.25 * np.stack([C[2, 1] - C[1, 2], C[0, 2] - C[2, 0], C[1, 0] - C[0, 1]])
     return np.sum(np.asarray(problem.model.mass) * (np.cross(x, v, axis=0) + spin), axis=1)
+
+
+RIGID_ROTATION = Problem(
+    name="rotation",
+    source="a plate that turns rigidly by a quarter under the centripetal force",
+    build=lambda cells, dtype: plate(
+        Vortex(amplitude=0.0, spin=1.0), cells, np.pi / 2, dtype=dtype
+    ),
+    ladder=(4, 8, 16, 32),
+    order=2,
+)
+VORTEX = Problem(
+    name="vortex",
+    source="Kamojjala, Brannon, Sadeghirad and Guilkey (2015), Engineering with Computers 31",
+    build=lambda cells, dtype: vortex(Vortex(), 1 / cells, 0.5, dtype=dtype),
+    ladder=(8, 16, 32),
+    order=2,
+)
