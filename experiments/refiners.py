@@ -18,9 +18,9 @@ import time
 from pathlib import Path
 
 from jaxphys.core.errors import InputError
-from jaxphys.guidance.language_model import LanguageModel, Message
-from jaxphys.guidance.refine import Refinement, refined_by
-from jaxphys.guidance.refine_local import PATH, find_local
+from jaxphys.guidance.prompts.language_model import LanguageModel, Message
+from jaxphys.guidance.prompts.local import PATH, find_local
+from jaxphys.guidance.prompts.refine import Refinement, refined_by
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "refiners.md"
 MARK = "<!-- From here on written by python -m experiments.refiners -->\n"

@@ -16,12 +16,17 @@ from flax import nnx
 
 from experiments.parity.full_size import random_weights
 from jaxphys.gaussians.gaussians import from_points
+from jaxphys.guidance.bundled.point_guide import bundled_shape_guide
 from jaxphys.guidance.choice import LATENT
-from jaxphys.guidance.discrete_schedule import DiscreteSchedule
-from jaxphys.guidance.guides import Guides, bundled_shape_guide
+from jaxphys.guidance.diffusion.discrete_schedule import DiscreteSchedule
+from jaxphys.guidance.guides import Guides
 from jaxphys.guidance.optimise import advance, start
 from jaxphys.guidance.pictures import neighbour_sizes, room_for_pairs
-from jaxphys.guidance.stable_diffusion import LatentPrior, LatentPriorConfig, StableDiffusionGuide
+from jaxphys.guidance.published.stable_diffusion import (
+    LatentPrior,
+    LatentPriorConfig,
+    StableDiffusionGuide,
+)
 from jaxphys.networks.autoencoder import AutoencoderConfig, Encoder
 from jaxphys.networks.unet import UNet, UNetConfig
 

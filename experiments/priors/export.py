@@ -6,8 +6,6 @@
 The manifest then holds what the run was: data, steps, seed, held-out error by noise level, command.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import tempfile
@@ -20,8 +18,8 @@ from flax import nnx
 from safetensors.numpy import save_file
 
 from jaxphys import weights
-from jaxphys.guidance.pixel_prior import PixelPrior, PixelPriorConfig
-from jaxphys.guidance.point_prior import PointPrior, PointPriorConfig
+from jaxphys.guidance.bundled.pixel_prior import PixelPrior, PixelPriorConfig
+from jaxphys.guidance.bundled.point_prior import PointPrior, PointPriorConfig
 from jaxphys.networks.parameters import named_parameters
 
 KINDS = {

@@ -4,18 +4,15 @@ The hidden matrices come stacked, (layers, inputs, outputs), and are orthogonali
 bfloat16 as its authors do.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import optax
-from jax import lax
+from jax import Array, lax
 
-from jaxphys.guidance.layers import scores
+from jaxphys.guidance.bundled.adaptive import scores
 
-Array = jax.Array
 Parameters = dict[str, Array]
 COEFFICIENTS = (3.4445, -4.7750, 2.0315)
 

@@ -1,7 +1,5 @@
 """Reads the prepared data (see the README.md of its folder) and says what is drawn how often."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -16,8 +16,8 @@ import numpy as np
 from safetensors.numpy import load_file, save_file
 
 from jaxphys import weights
-from jaxphys.guidance import text_encoder as port
-from jaxphys.guidance.quantise import Packed, pack
+from jaxphys.guidance.bundled import text_encoder as port
+from jaxphys.guidance.bundled.quantise import Packed, pack
 
 SOURCE = {
     "query": "attention.self.query",

@@ -5,20 +5,18 @@
 Stop it at any time; the same command goes on from the newest checkpoint.
 """
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import nnx
+from jax import Array
 
 from experiments.priors import prompts, records
 from experiments.priors.training import Task, arguments, train
-from jaxphys.guidance.diffusion import guided, karras_times, sample_heun
-from jaxphys.guidance.pixel_prior import PixelCondition, PixelPrior, PixelPriorConfig
+from jaxphys.guidance.bundled.pixel_prior import PixelCondition, PixelPrior, PixelPriorConfig
+from jaxphys.guidance.diffusion.samplers import karras_times, sample_heun
+from jaxphys.guidance.diffusion.schedule import guided
 from jaxphys.guidance.views import view_features
-
-Array = jax.Array
 
 
 def backgrounds(key: Array, count: int, resolution: int) -> Array:

@@ -5,25 +5,23 @@
 Stop it at any time; the same command goes on from the newest checkpoint, with other --points too.
 """
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import nnx
+from jax import Array
 
 from experiments.priors import prompts, records
 from experiments.priors.training import Task, arguments, train
-from jaxphys.guidance.diffusion import guided, karras_times, sample_heun
-from jaxphys.guidance.point_prior import (
+from jaxphys.guidance.bundled.point_prior import (
     PointCondition,
     PointPrior,
     PointPriorConfig,
     from_frame,
     to_frame,
 )
-
-Array = jax.Array
+from jaxphys.guidance.diffusion.samplers import karras_times, sample_heun
+from jaxphys.guidance.diffusion.schedule import guided
 
 
 def prepare(batch: dict[str, Array], key: Array) -> tuple[Array, PointCondition]:

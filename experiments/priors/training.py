@@ -4,8 +4,6 @@ Everything a run draws is a function of (seed, step), so that a run that was sto
 the run that was not. It trains in bfloat16 with float32 master weights, on any backend.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import signal
@@ -22,13 +20,13 @@ import numpy as np
 import optax
 import orbax.checkpoint as ocp
 from flax import nnx
+from jax import Array
 from PIL import Image
 
 from experiments.priors.muon import muon
-from jaxphys.guidance.diffusion import add_noise, interpret
+from jaxphys.guidance.diffusion.schedule import add_noise, interpret
 from jaxphys.networks.parameters import named_parameters, with_parameters
 
-Array = jax.Array
 Batch = dict[str, np.ndarray]
 EVALUATION_TIMES = (0.1, 0.3, 0.5, 0.7, 0.9)
 

@@ -2,8 +2,8 @@
 
 import jax
 import jax.numpy as jnp
+from jax import Array
 
-Array = jax.Array
 KERNEL = (0.25, 0.5, 0.25)
 
 

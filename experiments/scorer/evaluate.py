@@ -6,8 +6,6 @@ DATA is what `experiments.scorer.renders` wrote. With --rendered the same object
 with `jaxphys.render`, as Gaussians at their points: that is what the scorer is used on.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 from pathlib import Path
@@ -23,7 +21,7 @@ from experiments.priors.models.surfaces import sample
 from experiments.scorer.model import WEIGHTS, Scorer, embed, load
 from experiments.scorer.ranking import report, similarities, table
 from experiments.scorer.sentences import MODEL_NAMES, SENTENCES
-from jaxphys.guidance.text_encoder import load_text_encoder
+from jaxphys.guidance.bundled.text_encoder import load_text_encoder
 
 GROUND = 0.93  # plain and light
 

@@ -1,7 +1,5 @@
 """The scorer's network: a picture to a unit vector that is compared with those of sentences."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,16 +8,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import nnx
+from jax import Array
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.files import atomic_path
-from jaxphys.guidance.layers import Linear, normalise
-from jaxphys.guidance.text_encoder import WIDTH
+from jaxphys.guidance.bundled.adaptive import TrainableLinear, normalise
+from jaxphys.guidance.bundled.text_encoder import WIDTH
 from jaxphys.networks.parameters import named_parameters, with_parameters
 
-Array = jax.Array
 RESOLUTION = 64
 WEIGHTS = Path(__file__).with_name("weights.safetensors")
 
@@ -55,8 +53,8 @@ class Block(nnx.Module):
     """x + a 3 x 3 and a 1 x 1 convolution of it, after a norm (He et al. 2016)."""
 
     def __init__(self, width: int, *, rngs: nnx.Rngs):
-        self.inner = Linear(9 * width, width, rngs=rngs)
-        self.outer = Linear(width, width, rngs=rngs, zero=True)
+        self.inner = TrainableLinear(9 * width, width, rngs=rngs)
+        self.outer = TrainableLinear(width, width, rngs=rngs, zero=True)
 
     def __call__(self, x: Array) -> Array:
         return x + self.outer(jax.nn.relu(self.inner(windows(normalise(x)))))
@@ -72,11 +70,11 @@ class Scorer(nnx.Module):
         self.config = config
         inputs, stages = 12, []
         for width, count in zip(config.widths, config.blocks, strict=True):
-            down = Linear(4 * inputs, width, rngs=rngs)
+            down = TrainableLinear(4 * inputs, width, rngs=rngs)
             stages.append(nnx.List([down, *(Block(width, rngs=rngs) for _ in range(count))]))
             inputs = width
         self.stages = nnx.List(stages)
-        self.head = Linear(inputs, WIDTH, rngs=rngs)
+        self.head = TrainableLinear(inputs, WIDTH, rngs=rngs)
         self.log_sharpness = nnx.Param(jnp.asarray(2.5, jnp.float32))
 
     def __call__(self, pictures: Array) -> Array:

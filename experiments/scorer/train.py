@@ -6,8 +6,6 @@ DATA is what `experiments.scorer.renders` wrote. The averaged weights are writte
 with all that the next step depends on beside them (WEIGHTS.state.npz): the same command goes on.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import time
@@ -19,15 +17,15 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 from flax import nnx
+from jax import Array
 
 from experiments.scorer.augment import augment
 from experiments.scorer.evaluate import held_out_report
 from experiments.scorer.model import Scorer, ScorerConfig, save
 from jaxphys.core.files import atomic_path
-from jaxphys.guidance.text_encoder import load_text_encoder
+from jaxphys.guidance.bundled.text_encoder import load_text_encoder
 from jaxphys.networks.parameters import named_parameters, with_parameters
 
-Array = jax.Array
 DECAY = 0.98  # of the averaged weights
 SHARPEST = 4.0  # largest logarithm of the factor on the cosines
 SAVE_EVERY = 50  # steps

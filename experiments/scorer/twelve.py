@@ -11,8 +11,6 @@ ranked first) and half of them, unmarked, to FOLDER/overview.png. Ends with stat
 table says, 2 where there is none.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 
@@ -27,8 +25,8 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.files import atomic_path, write_json
 from jaxphys.gaussians.gaussians import Gaussians, opacities, to_splats
 from jaxphys.gaussians.ply import read_ply, write_ply
-from jaxphys.guidance.refine import refine
-from jaxphys.guidance.text_encoder import load_text_encoder
+from jaxphys.guidance.bundled.text_encoder import load_text_encoder
+from jaxphys.guidance.prompts.refine import refine
 from jaxphys.render import look_at, render
 
 VIEWS = 8

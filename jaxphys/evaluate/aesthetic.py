@@ -4,8 +4,6 @@ Both are affine. The first is one linear layer (Schuhmann et al. 2022). The seco
 author's "improved" predictor, is five of them with no activation in between, so it folds into one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple

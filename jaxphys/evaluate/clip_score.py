@@ -1,7 +1,5 @@
 """How well pictures fit a sentence: the cosine of their CLIP embeddings (Hessel et al. 2021)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import nnx
+from jax import Array
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.files import read_json
@@ -32,7 +31,7 @@ PUBLISHED_VISION = VisionConfig(
 
 
 @nnx.jit
-def _embed(tower: ClipText | ClipVision, inputs: jax.Array) -> jax.Array:
+def _embed(tower: ClipText | ClipVision, inputs: Array) -> Array:
     return unit_norm(tower(inputs))
 
 

@@ -1,7 +1,5 @@
 """The pictures of a video as CLIP reads them, evenly spaced."""
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A finished run scored as its paper scores it: prompt against video, and the video by itself."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,23 +1,17 @@
 """From the names of priors to guides told a prompt, and to the settings that suit them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from jaxphys.core.errors import InputError, nearest
-from jaxphys.guidance import point_e_guide, stable_diffusion
-from jaxphys.guidance.distillation import DistillationConfig
-from jaxphys.guidance.guides import (
-    Guides,
-    ImageGuide,
-    ShapeGuide,
-    bundled_image_guide,
-    bundled_shape_guide,
-)
+from jaxphys.guidance.bundled.pixel_guide import bundled_image_guide
+from jaxphys.guidance.bundled.point_guide import bundled_shape_guide
+from jaxphys.guidance.bundled.priors import require_prior
+from jaxphys.guidance.diffusion.score_distillation import DistillationConfig
+from jaxphys.guidance.guides import Guides, ImageGuide, ShapeGuide
 from jaxphys.guidance.optimise import OptimiseConfig
-from jaxphys.guidance.priors import require_prior
+from jaxphys.guidance.published import point_e_guide, stable_diffusion
 from jaxphys.weights.catalogue import CATALOGUE
 from jaxphys.weights.resolve import locate
 

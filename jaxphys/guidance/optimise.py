@@ -5,8 +5,6 @@ The 3D prior judges the centres in its own frame, which is the object's here: no
 turned or scaled before it is done.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 from flax import nnx
+from jax import Array
 from tqdm import tqdm
 
 from jaxphys.core.errors import InputError
@@ -25,13 +24,13 @@ from jaxphys.gaussians.density import DensityConfig, carry_moments, control_dens
 from jaxphys.gaussians.gaussians import Gaussians, from_points, select
 from jaxphys.gaussians.harmonics import dc_to_rgb
 from jaxphys.guidance import views
+from jaxphys.guidance.bundled.pixel_guide import bundled_image_guide
+from jaxphys.guidance.bundled.point_guide import bundled_shape_guide
 from jaxphys.guidance.clouds import even_subset
-from jaxphys.guidance.distillation import DistillationConfig
-from jaxphys.guidance.guides import Guides, bundled_image_guide, bundled_shape_guide
-from jaxphys.guidance.pictures import draw, neighbour_sizes, room_for_pairs
+from jaxphys.guidance.diffusion.score_distillation import DistillationConfig
+from jaxphys.guidance.guides import Guides
+from jaxphys.guidance.pictures import neighbour_sizes, room_for_pairs, view_picture
 from jaxphys.render import next_capacity
-
-Array = jax.Array
 
 
 @dataclass(frozen=True)
@@ -158,7 +157,7 @@ def advance(
 
     def loss(gaussians: Gaussians) -> tuple[Array, Array]:
         def picture(view):
-            image = draw(gaussians, *view, capacity, guides.image.resolution)
+            image = view_picture(gaussians, *view, capacity, guides.image.resolution)
             return image.colour, image.overflow
 
         images, overflow = jax.lax.map(picture, (azimuth, elevation, ground))

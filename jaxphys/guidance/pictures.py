@@ -1,10 +1,8 @@
 """The pictures that image priors judge, and that the bundled one is trained on: one way to draw."""
 
-from __future__ import annotations
-
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from scipy.spatial import cKDTree
 
 from jaxphys.gaussians.gaussians import Gaussians, to_splats
@@ -19,8 +17,6 @@ from jaxphys.render import (
     required_pairs,
 )
 
-Array = jax.Array
-
 
 def neighbour_sizes(points: np.ndarray, scale: float, largest: float) -> np.ndarray:
     """(N,) standard deviations that close a surface sampled at `points` (N, 3): `scale` times the
@@ -31,7 +27,7 @@ def neighbour_sizes(points: np.ndarray, scale: float, largest: float) -> np.ndar
     return np.clip(scale * mean, 1e-3, largest).astype(np.float32)
 
 
-def settings(resolution: int) -> Settings:
+def picture_settings(resolution: int) -> Settings:
     """Small tiles for small pictures."""
     return Settings(tile_size=8 if resolution <= 128 else 16)
 
@@ -50,7 +46,7 @@ def view_camera(
     )
 
 
-def draw(
+def view_picture(
     gaussians: Gaussians,
     azimuth: Array | float,
     elevation: Array | float,
@@ -63,15 +59,20 @@ def draw(
     eye = views.camera_position(azimuth, elevation, xp=jnp).astype(gaussians.means.dtype)
     splats = to_splats(gaussians, eye)
     return render(
-        splats, camera, background=background, settings=settings(resolution), capacity=capacity
+        splats,
+        camera,
+        background=background,
+        settings=picture_settings(resolution),
+        capacity=capacity,
     )
 
 
 def room_for_pairs(gaussians: Gaussians, resolution: int) -> int:
-    """Capacity for `draw`: twice what the neediest of a few views asks for."""
+    """Capacity for `view_picture`: twice what the neediest of a few views asks for."""
     needs = []
     for azimuth, elevation in ((0.0, 0.0), (1.6, 0.3), (0.8, 0.9)):
         eye = jnp.asarray(views.camera_position(azimuth, elevation), gaussians.means.dtype)
         camera = view_camera(azimuth, elevation, resolution, gaussians.means.dtype)
-        needs.append(int(required_pairs(to_splats(gaussians, eye), camera, settings(resolution))))
+        splats = to_splats(gaussians, eye)
+        needs.append(int(required_pairs(splats, camera, picture_settings(resolution))))
     return next_capacity(2 * max(needs))

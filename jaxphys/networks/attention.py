@@ -1,12 +1,8 @@
 """Attention, whole or in slices of queries so that memory is a setting."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
-from jax import lax
-
-Array = jax.Array
+from jax import Array, lax
 
 
 def split_heads(x: Array, heads: int) -> Array:

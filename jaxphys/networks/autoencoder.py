@@ -1,22 +1,19 @@
 """Pictures to latents and back: the two halves of Stable Diffusion's variational autoencoder
 (Rombach et al. 2022; Kingma & Welling 2014). Each can be filled without the other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 from flax import nnx
+from jax import Array
 
-from . import transformer
-from .diffusers_config import DiffusersConfig
-from .layers import Conv2d, GroupNorm, Linear
-from .resnet import COSTLY, Downsample, ResnetBlock, Upsample
-from .transformer import Attention
-
-Array = jax.Array
+from jaxphys.networks import transformer
+from jaxphys.networks.diffusers_config import DiffusersConfig
+from jaxphys.networks.layers import Conv2d, GroupNorm, Linear
+from jaxphys.networks.resnet import COSTLY, Downsample, ResnetBlock, Upsample
+from jaxphys.networks.transformer import CrossAttention
 
 # The files of Stable Diffusion 1 and 2 have the first four names, later ones those of the UNet.
 RENAMES = (
@@ -77,7 +74,7 @@ def _through(blocks: Sequence[nnx.Module], x: Array) -> Array:
     return x
 
 
-class PixelAttention(Attention):
+class PixelAttention(CrossAttention):
     """x + attention of one head among the pixels of (B, H, W, C)."""
 
     def __init__(self, width: int, config: AutoencoderConfig):
@@ -89,7 +86,7 @@ class PixelAttention(Attention):
         return x + super().__call__(tokens, tokens).reshape(x.shape)
 
 
-class DownBlock(nnx.Module):
+class EncoderBlock(nnx.Module):
     """Resnets, then half the size."""
 
     def __init__(self, inputs: int, outputs: int, config: AutoencoderConfig, *, last: bool):
@@ -101,7 +98,7 @@ class DownBlock(nnx.Module):
         return _through([*self.resnets, *self.downsamplers], x)
 
 
-class MiddleBlock(nnx.Module):
+class AttentiveBlock(nnx.Module):
     """A resnet, attention, a resnet, at the smallest size."""
 
     def __init__(self, width: int, config: AutoencoderConfig):
@@ -112,7 +109,7 @@ class MiddleBlock(nnx.Module):
         return _through([self.resnets[0], self.attentions[0], self.resnets[1]], x)
 
 
-class UpBlock(nnx.Module):
+class DecoderBlock(nnx.Module):
     """Resnets, one more than on the way down, then twice the size."""
 
     def __init__(self, inputs: int, outputs: int, config: AutoencoderConfig, *, last: bool):
@@ -132,9 +129,9 @@ class DownStack(nnx.Module):
         self.conv_in = Conv2d(config.in_channels, widths[0])
         inputs = (widths[0], *widths)
         self.down_blocks = nnx.List(
-            [DownBlock(inputs[i], widths[i], config, last=i == final) for i in range(final + 1)]
+            [EncoderBlock(inputs[i], widths[i], config, last=i == final) for i in range(final + 1)]
         )
-        self.mid_block = MiddleBlock(widths[-1], config)
+        self.mid_block = AttentiveBlock(widths[-1], config)
         self.conv_norm_out = GroupNorm(config.norm_num_groups, widths[-1], epsilon=EPSILON)
         self.conv_out = Conv2d(widths[-1], 2 * config.latent_channels)
 
@@ -152,10 +149,10 @@ class UpStack(nnx.Module):
         widths = config.block_out_channels[::-1]
         final = len(widths) - 1
         self.conv_in = Conv2d(config.latent_channels, widths[0])
-        self.mid_block = MiddleBlock(widths[0], config)
+        self.mid_block = AttentiveBlock(widths[0], config)
         inputs = (widths[0], *widths)
         self.up_blocks = nnx.List(
-            [UpBlock(inputs[i], widths[i], config, last=i == final) for i in range(final + 1)]
+            [DecoderBlock(inputs[i], widths[i], config, last=i == final) for i in range(final + 1)]
         )
         self.conv_norm_out = GroupNorm(config.norm_num_groups, widths[-1], epsilon=EPSILON)
         self.conv_out = Conv2d(widths[-1], config.out_channels)

@@ -1,20 +1,17 @@
 """The transformer that both towers of CLIP are made of (Radford et al. 2021): norms come first."""
 
-from __future__ import annotations
-
-import jax
 import jax.numpy as jnp
 from flax import nnx
+from jax import Array
 
-from .attention import attend, join_heads, split_heads
-from .clip_config import ACTIVATIONS, TextConfig, VisionConfig
-from .layers import LayerNorm, Linear
+from jaxphys.networks.attention import attend, join_heads, split_heads
+from jaxphys.networks.clip_config import ACTIVATIONS, TextConfig, VisionConfig
+from jaxphys.networks.layers import LayerNorm, Linear
 
-Array = jax.Array
 TowerConfig = TextConfig | VisionConfig
 
 
-class Attention(nnx.Module):
+class ClipAttention(nnx.Module):
     """Self-attention of several heads over (B, T, width)."""
 
     def __init__(self, width: int, heads: int):
@@ -32,7 +29,7 @@ class Attention(nnx.Module):
         return self.out_proj(join_heads(attend(queries, keys, values, causal=causal)))
 
 
-class Perceptron(nnx.Module):
+class ClipPerceptron(nnx.Module):
     """Two linear layers with an activation in between."""
 
     def __init__(self, config: TowerConfig):
@@ -44,26 +41,26 @@ class Perceptron(nnx.Module):
         return self.fc2(ACTIVATIONS[self.activation](self.fc1(x)))
 
 
-class Layer(nnx.Module):
+class ClipLayer(nnx.Module):
     """Attention and a perceptron, each added to what it read."""
 
     def __init__(self, config: TowerConfig):
         width, epsilon = config.hidden_size, config.layer_norm_eps
         self.layer_norm1 = LayerNorm(width, epsilon=epsilon)
-        self.self_attn = Attention(width, config.num_attention_heads)
+        self.self_attn = ClipAttention(width, config.num_attention_heads)
         self.layer_norm2 = LayerNorm(width, epsilon=epsilon)
-        self.mlp = Perceptron(config)
+        self.mlp = ClipPerceptron(config)
 
     def __call__(self, x: Array, *, causal: bool) -> Array:
         x = x + self.self_attn(self.layer_norm1(x), causal=causal)
         return x + self.mlp(self.layer_norm2(x))
 
 
-class Encoder(nnx.Module):
+class ClipTransformer(nnx.Module):
     """The layers one after another: (B, T, width) -> the same."""
 
     def __init__(self, config: TowerConfig):
-        self.layers = nnx.List([Layer(config) for _ in range(config.num_hidden_layers)])
+        self.layers = nnx.List([ClipLayer(config) for _ in range(config.num_hidden_layers)])
 
     def __call__(self, x: Array, *, causal: bool) -> Array:
         for layer in self.layers:

@@ -4,15 +4,12 @@ Fields are named as in the file. Their defaults are those of the published forma
 what does not differ from them.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from typing import Any, Self
 
 from jaxphys.core.errors import InputError, nearest
-
-from .layers import gelu, quick_gelu
+from jaxphys.networks.layers import gelu, quick_gelu
 
 ACTIVATIONS = {"quick_gelu": quick_gelu, "gelu": gelu}
 LEGACY_END = 2

@@ -1,7 +1,5 @@
 """Pictures as CLIP was shown them (Radford et al. 2021): a square from the middle, in its units."""
 
-from __future__ import annotations
-
 import numpy as np
 from PIL import Image
 

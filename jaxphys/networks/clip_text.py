@@ -1,23 +1,18 @@
 """CLIP's text tower (Radford et al. 2021), which is also Stable Diffusion's text encoder."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import nnx
+from jax import Array
 
 from jaxphys.core.errors import InputError
-
-from .clip_block import Encoder
-from .clip_config import LEGACY_END, TextConfig
-from .layers import Embedding, LayerNorm, Linear
-from .parameters import fill
-
-Array = jax.Array
+from jaxphys.networks.clip_block import ClipTransformer
+from jaxphys.networks.clip_config import LEGACY_END, TextConfig
+from jaxphys.networks.layers import Embedding, LayerNorm, Linear
+from jaxphys.networks.parameters import fill
 
 # Text encoders of diffusion models are stored with and without this prefix.
 TOWER_RENAMES = ((r"^text_model\.", ""),)
@@ -61,7 +56,7 @@ class TextTower(nnx.Module):
     def __init__(self, config: TextConfig):
         self.config = config
         self.embeddings = TextEmbeddings(config)
-        self.encoder = Encoder(config)
+        self.encoder = ClipTransformer(config)
         self.final_layer_norm = LayerNorm(config.hidden_size, epsilon=config.layer_norm_eps)
 
     def __call__(self, ids: Array) -> TextOutput:

@@ -2,8 +2,6 @@
 al. 2021) with a mark at the end of every word.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,22 +1,17 @@
 """CLIP's picture tower, a vision transformer (Dosovitskiy et al. 2021; Radford et al. 2021)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import nnx
+from jax import Array
 
 from jaxphys.core.errors import InputError
-
-from .clip_block import Encoder
-from .clip_config import VisionConfig
-from .layers import Conv2d, Embedding, LayerNorm, Linear
-from .parameters import fill
-
-Array = jax.Array
+from jaxphys.networks.clip_block import ClipTransformer
+from jaxphys.networks.clip_config import VisionConfig
+from jaxphys.networks.layers import Conv2d, Embedding, LayerNorm, Linear
+from jaxphys.networks.parameters import fill
 
 VISION_IGNORES = (
     r"vision_model\.embeddings\.position_ids",
@@ -58,7 +53,7 @@ class VisionTower(nnx.Module):
         width, epsilon = config.hidden_size, config.layer_norm_eps
         self.embeddings = VisionEmbeddings(config)
         self.pre_layrnorm = LayerNorm(width, epsilon=epsilon)  # spelled so in every checkpoint
-        self.encoder = Encoder(config)
+        self.encoder = ClipTransformer(config)
         self.post_layernorm = LayerNorm(width, epsilon=epsilon)
 
     def __call__(self, pixels: Array) -> Array:

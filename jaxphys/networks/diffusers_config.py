@@ -4,8 +4,6 @@ Fields are named as in the file. Their defaults are those of the published forma
 out. An option that would need another computation than ours is refused, by its name.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass

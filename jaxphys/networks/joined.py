@@ -1,7 +1,5 @@
 """Matrices of a checkpoint that act on the same rows, joined into one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np

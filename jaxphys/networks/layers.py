@@ -3,17 +3,14 @@
 Parameters start as zeros: these modules are filled from checkpoints, never trained from here.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import nnx
-from jax import lax
+from jax import Array, lax
 
-Array = jax.Array
 Padding = tuple[tuple[int, int], tuple[int, int]]
 LEAST_FOR_TAPS = 256  # channels from which on `_by_taps` is the faster way
 

@@ -6,17 +6,14 @@ read once is kept: a cache of keys and values makes the next token cost one row 
 text.
 """
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 from flax import nnx
-from jax import lax
+from jax import Array, lax
 
-from .layers import Embedding, Linear
-from .llama_config import LlamaConfig
+from jaxphys.networks.layers import Embedding, Linear
+from jaxphys.networks.llama_config import LlamaConfig
 
-Array = jax.Array
 # Keys and values (B * key heads, capacity, D) of every layer; written up to the text's length. With
 # more axes XLA would reshape them for its products, and copy them to do so, for every token.
 Cache = tuple[tuple[Array, Array], ...]
@@ -60,7 +57,7 @@ def rotate(x: Array, cosines: Array, sines: Array) -> Array:
     return x * cosines + jnp.concatenate((-second, first), axis=-1) * sines
 
 
-class Attention(nnx.Module):
+class GroupedQueryAttention(nnx.Module):
     """Causal attention in which groups of query heads share a head of keys and values (Ainslie et
     al. 2023).
     """
@@ -107,7 +104,7 @@ class Attention(nnx.Module):
         return self.o_proj(mixed), (keys, values)
 
 
-class FeedForward(nnx.Module):
+class LlamaPerceptron(nnx.Module):
     """down(silu(gate(x)) * up(x)) (Shazeer 2020)."""
 
     def __init__(self, config: LlamaConfig):
@@ -120,14 +117,14 @@ class FeedForward(nnx.Module):
         return self.down_proj(jax.nn.silu(gate) * up)
 
 
-class Block(nnx.Module):
+class LlamaBlock(nnx.Module):
     """Attention, then the feed-forward layer, each on normalised input and added to it."""
 
     def __init__(self, config: LlamaConfig):
         self.input_layernorm = RMSNorm(config.hidden_size, epsilon=config.rms_norm_eps)
-        self.self_attn = Attention(config)
+        self.self_attn = GroupedQueryAttention(config)
         self.post_attention_layernorm = RMSNorm(config.hidden_size, epsilon=config.rms_norm_eps)
-        self.mlp = FeedForward(config)
+        self.mlp = LlamaPerceptron(config)
 
     def __call__(
         self, x: Array, cache: tuple[Array, Array], positions: Array
@@ -137,12 +134,12 @@ class Block(nnx.Module):
         return x + self.mlp(self.post_attention_layernorm(x)), cache
 
 
-class Decoder(nnx.Module):
+class LlamaDecoder(nnx.Module):
     """Embeddings, blocks and the last norm."""
 
     def __init__(self, config: LlamaConfig):
         self.embed_tokens = Embedding(config.vocab_size, config.hidden_size)
-        self.layers = nnx.List([Block(config) for _ in range(config.num_hidden_layers)])
+        self.layers = nnx.List([LlamaBlock(config) for _ in range(config.num_hidden_layers)])
         self.norm = RMSNorm(config.hidden_size, epsilon=config.rms_norm_eps)
 
     def embed(self, ids: Array) -> Array:
@@ -166,7 +163,7 @@ class Llama(nnx.Module):
 
     def __init__(self, config: LlamaConfig):
         self.config = config
-        self.model = Decoder(config)
+        self.model = LlamaDecoder(config)
         tied = config.tie_word_embeddings
         self.lm_head = None if tied else Linear(config.hidden_size, config.vocab_size, bias=False)
 

@@ -4,8 +4,6 @@ Fields are named as in the config.json of the first format; GGUF files say the s
 What would need another computation than `llama` has is refused, by the name of the field.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A module's parameters by name, and modules filled from the arrays of a published checkpoint."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
@@ -10,10 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import nnx
+from jax import Array
 
 from jaxphys.core.errors import InputError
 
-Array = jax.Array
 Module = TypeVar("Module", bound=nnx.Module)
 Renames = Sequence[tuple[str, str]]
 

@@ -4,25 +4,21 @@ One token per point, and what the network is told as more tokens in front. Point
 a sequence, so there is no position embedding: the result is equivariant to their order.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Self
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import nnx
+from jax import Array
 
 from jaxphys.core.errors import InputError
+from jaxphys.networks.attention import attend, join_heads, split_heads
+from jaxphys.networks.layers import LayerNorm, Linear, gelu
 
-from .attention import attend, join_heads, split_heads
-from .layers import LayerNorm, Linear, gelu
-
-Array = jax.Array
 CHANNELS = 6
 HEAD = 64
 LONGEST_PERIOD = 10_000.0
@@ -72,7 +68,7 @@ class PointEConfig:
         return cls(width, len(layers), heads, grid=grid, slice_size=slice_size)
 
 
-class Attention(nnx.Module):
+class FusedAttention(nnx.Module):
     """Self-attention over (B, T, width). Each head has its queries, keys and values side by side in
     the one projection."""
 
@@ -86,7 +82,7 @@ class Attention(nnx.Module):
         return self.c_proj(join_heads(attend(queries, keys, values, slice_size=self.slice_size)))
 
 
-class Perceptron(nnx.Module):
+class PointEPerceptron(nnx.Module):
     """Two linear layers, four times as wide in between."""
 
     def __init__(self, width: int):
@@ -97,14 +93,14 @@ class Perceptron(nnx.Module):
         return self.c_proj(gelu(self.c_fc(x)))
 
 
-class Block(nnx.Module):
+class PointEBlock(nnx.Module):
     """Attention and a perceptron, each added to what it read; norms come first."""
 
     def __init__(self, config: PointEConfig):
         self.ln_1 = LayerNorm(config.width)
-        self.attn = Attention(config)
+        self.attn = FusedAttention(config)
         self.ln_2 = LayerNorm(config.width)
-        self.mlp = Perceptron(config.width)
+        self.mlp = PointEPerceptron(config.width)
 
     def __call__(self, x: Array) -> Array:
         x = x + self.attn(self.ln_1(x))
@@ -115,7 +111,7 @@ class Backbone(nnx.Module):
     """The blocks one after another."""
 
     def __init__(self, config: PointEConfig):
-        self.resblocks = nnx.List([Block(config) for _ in range(config.layers)])
+        self.resblocks = nnx.List([PointEBlock(config) for _ in range(config.layers)])
 
     def __call__(self, x: Array) -> Array:
         for block in self.resblocks:
@@ -128,7 +124,7 @@ class PointTransformer(nnx.Module):
 
     def __init__(self, config: PointEConfig):
         self.config = config
-        self.time_embed = Perceptron(config.width)
+        self.time_embed = PointEPerceptron(config.width)
         self.input_proj = Linear(CHANNELS, config.width)
         self.ln_pre = LayerNorm(config.width)
         self.backbone = Backbone(config)

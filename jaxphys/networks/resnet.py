@@ -1,15 +1,13 @@
 """What the convolutional halves of Stable Diffusion's networks share (Rombach et al. 2022)."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 from flax import nnx
+from jax import Array
 from jax.ad_checkpoint import checkpoint_name
 
-from .layers import Conv2d, GroupNorm, Linear, Padding
+from jaxphys.networks.layers import Conv2d, GroupNorm, Linear, Padding
 
-Array = jax.Array
 COSTLY = "costly"  # what is worth keeping where a gradient computes the rest again
 
 

@@ -1,14 +1,12 @@
 """What a diffusion network is told of the step that it denoises."""
 
-from __future__ import annotations
-
 import jax
 import jax.numpy as jnp
 from flax import nnx
+from jax import Array
 
-from .layers import Linear
+from jaxphys.networks.layers import Linear
 
-Array = jax.Array
 LONGEST = 1e4  # steps a radian of the slowest wave
 
 

@@ -1,15 +1,11 @@
 """Transformer over the pixels of a picture that reads a text (Rombach et al. 2022, sec. 3.3)."""
 
-from __future__ import annotations
-
-import jax
 import jax.numpy as jnp
 from flax import nnx
+from jax import Array
 
-from .attention import attend, join_heads, split_heads
-from .layers import GroupNorm, LayerNorm, Linear, gelu
-
-Array = jax.Array
+from jaxphys.networks.attention import attend, join_heads, split_heads
+from jaxphys.networks.layers import GroupNorm, LayerNorm, Linear, gelu
 
 # Checkpoints number these layers among others that hold no parameter.
 RENAMES = (
@@ -19,7 +15,7 @@ RENAMES = (
 )
 
 
-class Attention(nnx.Module):
+class CrossAttention(nnx.Module):
     """Multi-head attention (Vaswani et al. 2017) of (B, T, width) tokens to (B, S, context)."""
 
     def __init__(self, width: int, context: int, heads: int, *, bias: bool, slice_size: int | None):
@@ -36,7 +32,7 @@ class Attention(nnx.Module):
         return self.to_out(join_heads(attend(queries, keys, values, slice_size=self.slice_size)))
 
 
-class FeedForward(nnx.Module):
+class GatedPerceptron(nnx.Module):
     """Perceptron with a gate (Shazeer 2020, GEGLU)."""
 
     def __init__(self, width: int):
@@ -53,11 +49,11 @@ class TransformerBlock(nnx.Module):
 
     def __init__(self, width: int, context: int, heads: int, *, slice_size: int | None):
         self.norm1 = LayerNorm(width)
-        self.attn1 = Attention(width, width, heads, bias=False, slice_size=slice_size)
+        self.attn1 = CrossAttention(width, width, heads, bias=False, slice_size=slice_size)
         self.norm2 = LayerNorm(width)
-        self.attn2 = Attention(width, context, heads, bias=False, slice_size=slice_size)
+        self.attn2 = CrossAttention(width, context, heads, bias=False, slice_size=slice_size)
         self.norm3 = LayerNorm(width)
-        self.ff = FeedForward(width)
+        self.ff = GatedPerceptron(width)
 
     def __call__(self, x: Array, states: Array) -> Array:
         inner = self.norm1(x)

@@ -1,24 +1,21 @@
 """The denoiser of Stable Diffusion 1 and 2: a U-Net (Ronneberger et al. 2015) over latents that
 reads a text between its convolutions (Rombach et al. 2022)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 from flax import nnx
+from jax import Array
 
 from jaxphys.core.errors import InputError
+from jaxphys.networks import transformer
+from jaxphys.networks.diffusers_config import DiffusersConfig
+from jaxphys.networks.layers import Conv2d, GroupNorm
+from jaxphys.networks.resnet import Downsample, ResnetBlock, Upsample
+from jaxphys.networks.timestep import TimestepEmbedding, waves
+from jaxphys.networks.transformer import SpatialTransformer
 
-from . import transformer
-from .diffusers_config import DiffusersConfig
-from .layers import Conv2d, GroupNorm
-from .resnet import Downsample, ResnetBlock, Upsample
-from .timestep import TimestepEmbedding, waves
-from .transformer import SpatialTransformer
-
-Array = jax.Array
 RENAMES = transformer.RENAMES
 DOWN_READING, UP_READING = "CrossAttnDownBlock2D", "CrossAttnUpBlock2D"  # those that read the text
 

@@ -15,7 +15,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.files import read_json, write_json
 from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.gaussians.ply import read_ply, write_ply
-from jaxphys.guidance.refine import Refinement, check_prompt, refine
+from jaxphys.guidance.prompts.refine import Refinement, check_prompt, refine
 from jaxphys.pipeline.animate import Watch, animate
 from jaxphys.pipeline.interrupt import deferred_interrupt
 from jaxphys.pipeline.output import Timing, run_directory

@@ -16,7 +16,7 @@ def paint_file(
     or weights that cannot be had, before anything is computed.
     """
     from jaxphys.guidance.choice import image_folder
-    from jaxphys.guidance.text_to_image import PaintConfig, paint
+    from jaxphys.guidance.published.text_to_image import PaintConfig, paint
 
     if out.suffix.lower() != ".png":
         raise InputError(f"--out {out}: must end in .png")

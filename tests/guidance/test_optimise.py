@@ -6,18 +6,13 @@ from flax import nnx
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
-from jaxphys.guidance.guides import Guides, PixelGuide, PointGuide
-from jaxphys.guidance.optimise import (
-    OptimiseConfig,
-    draw,
-    draw_views,
-    neighbour_sizes,
-    optimise,
-    start,
-    text_to_gaussians,
-)
-from jaxphys.guidance.pixel_prior import PixelPrior, PixelPriorConfig
-from jaxphys.guidance.point_prior import PointPrior, PointPriorConfig
+from jaxphys.guidance.bundled.pixel_guide import PixelGuide
+from jaxphys.guidance.bundled.pixel_prior import PixelPrior, PixelPriorConfig
+from jaxphys.guidance.bundled.point_guide import PointGuide
+from jaxphys.guidance.bundled.point_prior import PointPrior, PointPriorConfig
+from jaxphys.guidance.guides import Guides
+from jaxphys.guidance.optimise import OptimiseConfig, draw_views, optimise, start, text_to_gaussians
+from jaxphys.guidance.pictures import draw, neighbour_sizes
 from jaxphys.guidance.views import ELEVATIONS
 
 CONFIG = OptimiseConfig(count=24, room=1.5, steps=4, views=2, density_every=2)

@@ -6,12 +6,12 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import numpy as np
 import pytest
 
+import jaxphys.guidance.bundled.priors as priors
 import jaxphys.guidance.choice as choice
 import jaxphys.guidance.optimise as optimise
-import jaxphys.guidance.priors as priors
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
-from jaxphys.guidance.refine import Refinement
+from jaxphys.guidance.prompts.refine import Refinement
 from jaxphys.pipeline import generate as generate_module
 from jaxphys.pipeline.generate import generate
 from jaxphys.scene import Domain, Object, Scene, read_scene

@@ -9,7 +9,7 @@ from PIL import Image
 
 from jaxphys.cli.main import run
 from jaxphys.core.errors import InputError
-from jaxphys.guidance.point_e import PointESampling, sample_point_e
+from jaxphys.guidance.published.point_e import PointESampling, sample_point_e
 from jaxphys.pipeline.generate import generate
 from jaxphys.scene import Domain, Object, Scene
 from tests import checkpoints

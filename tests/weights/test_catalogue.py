@@ -7,8 +7,8 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.evaluate.aesthetic import HEADS
-from jaxphys.guidance.point_e_guide import BASE, CLIP, UPSAMPLER
-from jaxphys.guidance.stable_diffusion import PARTS
+from jaxphys.guidance.published.point_e_guide import BASE, CLIP, UPSAMPLER
+from jaxphys.guidance.published.stable_diffusion import PARTS
 from jaxphys.weights import manifest
 from jaxphys.weights.catalogue import CATALOGUE, find_entry, halved
 

@@ -80,7 +80,7 @@ def assemble(objects: Path, prepared: Path, encode) -> dict:
 
 
 def main() -> None:
-    from jaxphys.guidance.text_encoder import load_text_encoder
+    from jaxphys.guidance.bundled.text_encoder import load_text_encoder
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("objects", type=Path)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxphys.gaussians.gaussians import from_points
-from jaxphys.guidance.pictures import draw, neighbour_sizes
+from jaxphys.guidance.pictures import neighbour_sizes, view_picture
 from jaxphys.render import next_capacity
 
 SIZE, LARGEST, OPACITY = 0.6, 0.04, 0.95  # of the Gaussians: see `neighbour_sizes`
@@ -20,7 +20,7 @@ def _draw(points, colours, sizes, azimuth, elevation, capacity):
     gaussians = from_points(points, colours, sizes, opacity=OPACITY)
 
     def one(view):
-        image = draw(gaussians, *view, 0.0, capacity)
+        image = view_picture(gaussians, *view, 0.0, capacity)
         return jnp.concatenate([image.colour, image.alpha[..., None]], -1), image.required
 
     return jax.lax.map(one, (azimuth, elevation))

@@ -1,0 +1,1 @@
+"""The text encoder and the two priors that come with the package, and their guides."""

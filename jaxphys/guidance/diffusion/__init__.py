@@ -1,0 +1,1 @@
+"""Diffusion itself: schedules, samplers and score distillation; knows no prior."""

@@ -1,0 +1,143 @@
+"""Score distillation: losses whose gradient is what a diffusion prior would change.
+
+DreamFusion (Poole et al. 2023, eq. 3): noise the rendering, ask the prior which noise it sees, and
+move by `w(t) (noise_seen - noise_added)`, without differentiating the prior.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from flax import nnx
+from jax import Array, lax
+
+from jaxphys.core.errors import InputError, nearest
+from jaxphys.guidance.diffusion.schedule import (
+    Estimate,
+    add_noise,
+    expand,
+    guided,
+    interpret,
+    rescaled,
+)
+
+Weight = Literal["sigma_squared", "uniform", "alpha_sigma_squared", "clean"]
+WEIGHTS = ("sigma_squared", "uniform", "alpha_sigma_squared", "clean")
+
+
+@dataclass(frozen=True)
+class DistillationConfig:
+    """Choices of one distillation loss.
+
+    Attributes:
+        guidance: classifier-free guidance, `u + s (c - u)`; 1 is none.
+        rescale: how much of the guided estimate's spread is brought back, in [0, 1].
+        weight: w(t) of the gradient. "sigma_squared" sigma^2 (DreamFusion, GSGEN); "uniform" 1;
+            "alpha_sigma_squared" alpha sigma^2 (Fantasia3D); "clean" sigma / alpha, which makes the
+            gradient the difference of the sample and its clean estimate (as HiFA's image loss).
+        time: (lowest, highest at the start, highest at the end) of the noise level, in [0, 1]: the
+            range is annealed linearly with progress.
+        clip: largest length of one pixel's or point's gradient; None for no limit.
+        limit: clean estimates are clipped to [-limit, limit], the range of the data.
+    """
+
+    guidance: float = 7.5
+    rescale: float = 0.5
+    weight: Weight = "sigma_squared"
+    time: tuple[float, float, float] = (0.02, 0.98, 0.5)
+    clip: float | None = None
+    limit: float | None = 1.0
+
+    def __post_init__(self):
+        if self.weight not in WEIGHTS:
+            raise InputError(f"unknown weight {self.weight!r}: {nearest(self.weight, WEIGHTS)}")
+        lowest, start, end = self.time
+        if not 0.0 < lowest <= min(start, end) or max(start, end) >= 1.0:
+            raise InputError(f"time {self.time} must satisfy 0 < lowest <= highest < 1")
+
+
+class Distillation(NamedTuple):
+    """A loss and what it was made of.
+
+    value: scalar; only its gradient means anything. gradient: g, of the samples' shape, before the
+    division by the batch. clean: the prior's guided clean estimate, detached. time: (B,).
+    """
+
+    value: Array
+    gradient: Array
+    clean: Array
+    time: Array
+
+
+def weight_of(kind: Weight, alpha: Array, sigma: Array) -> Array:
+    """w(t), see `DistillationConfig`."""
+    if kind == "sigma_squared":
+        return sigma**2
+    if kind == "alpha_sigma_squared":
+        return alpha * sigma**2
+    if kind == "clean":
+        return sigma / alpha
+    return jnp.ones_like(alpha)
+
+
+def draw_time(key: Array, count: int, config: DistillationConfig, progress: Array | float) -> Array:
+    """(B,) noise levels, one in each equal part of the range that `progress` in [0, 1] leaves."""
+    lowest, start, end = config.time
+    highest = start + (end - start) * jnp.clip(progress, 0.0, 1.0)
+    dtype = jnp.result_type(highest, jnp.float32)
+    place = (jnp.arange(count, dtype=dtype) + jax.random.uniform(key, (count,), dtype)) / count
+    return lowest + (highest - lowest) * place
+
+
+def guided_estimate(
+    prior: nnx.Module,
+    noisy: Array,
+    time: Array,
+    condition: Any,
+    unconditional: Any,
+    config: DistillationConfig,
+) -> Estimate:
+    """Clean sample and noise as the guided prior sees them, clipped and rescaled."""
+    kind, schedule = prior.config.kind, prior.schedule
+    both = jax.tree.map(lambda a, b: jnp.concatenate([a, b]), condition, unconditional)
+    prediction = prior(jnp.concatenate([noisy, noisy]), jnp.concatenate([time, time]), both)
+    told, untold = jnp.split(prediction, 2)
+    clean = interpret(schedule, kind, guided(told, untold, config.guidance), noisy, time).clean
+    if config.rescale:
+        conditional = interpret(schedule, kind, told, noisy, time).clean
+        clean = rescaled(clean, conditional, config.rescale)
+    if config.limit is not None:
+        clean = jnp.clip(clean, -config.limit, config.limit)
+    return interpret(schedule, "clean", clean, noisy, time)
+
+
+def score_distillation(
+    prior: nnx.Module,
+    samples: Array,
+    condition: Any,
+    unconditional: Any,
+    key: Array,
+    config: DistillationConfig,
+    progress: Array | float = 0.0,
+) -> Distillation:
+    """The score-distillation loss of (B, ...) samples in the prior's frame.
+
+    Its gradient with respect to the samples is g / B, g = w(t) (noise_seen - noise_added), and is
+    zero with respect to all else: the loss is `0.5 |x - stop(x - g)|^2 / B`.
+    """
+    count = samples.shape[0]
+    time_key, noise_key = jax.random.split(key)
+    time = draw_time(time_key, count, config, progress).astype(samples.dtype)
+    noise = jax.random.normal(noise_key, samples.shape, samples.dtype)
+    fixed = lax.stop_gradient(samples)
+    noisy = add_noise(prior.schedule, fixed, noise, time)
+    estimate = guided_estimate(prior, noisy, time, condition, unconditional, config)
+    weight = weight_of(config.weight, *prior.schedule.alpha_sigma(time))
+    gradient = expand(weight, samples) * (estimate.noise - noise)
+    if config.clip is not None:
+        length = jnp.sqrt(jnp.sum(gradient**2, -1, keepdims=True))
+        gradient = gradient * (config.clip / jnp.maximum(length, config.clip))
+    gradient = lax.stop_gradient(gradient)
+    value = 0.5 * jnp.sum((samples - (fixed - gradient)) ** 2) / count
+    return Distillation(value, gradient, lax.stop_gradient(estimate.clean), time)

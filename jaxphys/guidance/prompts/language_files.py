@@ -1,0 +1,120 @@
+"""What a language model's files hold: a .gguf file, or a folder as Hugging Face publishes them."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from tokenizers import Tokenizer
+
+from jaxphys.core.errors import InputError
+from jaxphys.core.files import read_json
+from jaxphys.networks.llama_config import LlamaConfig
+from jaxphys.weights.gguf_file import read_gguf
+from jaxphys.weights.gguf_tokenizer import tokenizer_from_gguf
+from jaxphys.weights.safetensors_files import open_arrays
+
+TURN, END_OF_TURN = "<|im_start|>", "<|im_end|>"
+
+
+class LanguageFiles(NamedTuple):
+    """`ends` are the ids of the tokens after which an answer is over."""
+
+    name: str
+    config: LlamaConfig
+    arrays: Mapping[str, np.ndarray]
+    tokenizer: Tokenizer
+    ends: frozenset[int]
+
+
+def open_language_files(path: str | Path) -> LanguageFiles:
+    """Configuration, arrays (each read when it is asked for) and tokenizer.
+
+    Args:
+        path: a .gguf file, a folder with nothing but one, or one with config.json, tokenizer.json
+            and safetensors.
+
+    Raises:
+        InputError: something is missing, damaged or not supported, or the model was not trained on
+            conversations in the ChatML form.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError(f"{path}: is missing; give a .gguf file or a folder with config.json")
+    if not path.is_dir():
+        return _from_gguf(path)
+    files = sorted(path.glob("*.gguf"))
+    if (path / "config.json").exists() or not files:
+        return _from_folder(path)
+    if len(files) > 1:
+        raise InputError(f"{path}: holds {len(files)} .gguf files; name the one to read")
+    return _from_gguf(files[0])
+
+
+def _from_gguf(path: Path) -> LanguageFiles:
+    file = read_gguf(path)
+    config = LlamaConfig.from_gguf(file.metadata, str(path))
+    config = dataclasses.replace(config, tie_word_embeddings="lm_head.weight" not in file.arrays)
+    tokenizer = tokenizer_from_gguf(file.metadata, str(path))
+    return _language_files(
+        path.stem,
+        config,
+        file.arrays,
+        tokenizer,
+        [file.metadata.get("tokenizer.ggml.eos_token_id")],
+        file.metadata.get("tokenizer.chat_template"),
+        str(path),
+    )
+
+
+def _from_folder(path: Path) -> LanguageFiles:
+    values = read_json(path / "config.json")
+    config = LlamaConfig.from_json(values, str(path / "config.json"))
+    file = path / "tokenizer.json"
+    try:
+        tokenizer = Tokenizer.from_str(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read ({error.strerror})") from None
+    except Exception as error:  # the package raises nothing more special
+        raise InputError(f"{file}: is no tokenizer ({error}); get it again") from None
+    tokenizer.no_truncation()
+    tokenizer.no_padding()
+    template, written = None, path / "chat_template.jinja"
+    if written.exists():
+        template = written.read_text(encoding="utf-8", errors="replace")
+    elif (path / "tokenizer_config.json").exists():
+        template = read_json(path / "tokenizer_config.json").get("chat_template")
+    generation = path / "generation_config.json"
+    known = read_json(generation) if generation.exists() else {}
+    ends = [end for found in (values, known) for end in _list(found.get("eos_token_id"))]
+    return _language_files(
+        path.name, config, open_arrays(path), tokenizer, ends, template, str(path)
+    )
+
+
+def _list(value: Any) -> list:
+    return value if isinstance(value, list) else [value]
+
+
+def _language_files(
+    name: str,
+    config: LlamaConfig,
+    arrays: Mapping[str, np.ndarray],
+    tokenizer: Tokenizer,
+    ends: list,
+    template: Any,
+    source: str,
+) -> LanguageFiles:
+    marks = [tokenizer.token_to_id(mark) for mark in (TURN, END_OF_TURN)]
+    if None in marks or (isinstance(template, str) and TURN not in template):
+        raise InputError(
+            f"{source}: is not made for conversations in the ChatML form ({TURN} ... {END_OF_TURN})"
+        )
+    if tokenizer.get_vocab_size() > config.vocab_size:
+        raise InputError(
+            f"{source}: the tokenizer has {tokenizer.get_vocab_size()} tokens,"
+            f" the network {config.vocab_size}; they do not belong together"
+        )
+    known = {end for end in ends if isinstance(end, int) and 0 <= end < config.vocab_size}
+    return LanguageFiles(name, config, arrays, tokenizer, frozenset({*known, *marks}))

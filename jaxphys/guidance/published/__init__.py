@@ -1,0 +1,1 @@
+"""Priors that were published by others: Stable Diffusion and Point-E, and their guides."""

@@ -1,0 +1,135 @@
+"""Pictures from text by Stable Diffusion: what it paints shows whether a checkpoint is whole."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import nnx
+from jax import Array
+
+from jaxphys.core.errors import InputError, nearest
+from jaxphys.guidance.diffusion.discrete_schedule import DiscreteSchedule
+from jaxphys.guidance.diffusion.samplers import sample_ddim
+from jaxphys.guidance.diffusion.schedule import guided, interpret
+from jaxphys.guidance.published.stable_diffusion import (
+    LatentPrior,
+    TextStates,
+    encode_texts,
+    load_decoder,
+    load_prior,
+)
+from jaxphys.networks.autoencoder import Decoder
+
+Sampler = Literal["ddim", "ddpm"]
+SAMPLERS = ("ddim", "ddpm")
+OFFSET = 1  # of the sampled steps, as the published schedulers' `steps_offset`
+
+
+@dataclass(frozen=True)
+class PaintConfig:
+    """How a picture is sampled.
+
+    Attributes:
+        steps: of the sampler, at most those of the schedule.
+        guidance: `u + s (c - u)`; 1 is none.
+        sampler: "ddim" (Song et al. 2021) deterministic, "ddpm" (Ho et al. 2020) ancestral.
+        width, height: [pixels], multiples of what a latent stands for (8 in the published
+            models); None is the size that the network was trained on.
+        attention_slice: queries at a time, see `attend`.
+        dtype: of weights and computation.
+    """
+
+    steps: int = 50
+    guidance: float = 7.5
+    sampler: Sampler = "ddim"
+    width: int | None = None
+    height: int | None = None
+    attention_slice: int | None = 1024
+    dtype: str = "bfloat16"
+
+    def __post_init__(self):
+        if self.sampler not in SAMPLERS:
+            raise InputError(f"sampler {self.sampler!r}: {nearest(self.sampler, SAMPLERS)}")
+        if self.steps < 1:
+            raise InputError(f"steps = {self.steps}: needs at least one")
+
+
+def sampling_times(schedule: DiscreteSchedule, steps: int, sampler: Sampler) -> Array:
+    """(steps + 1,) falling times: every so-many steps of the schedule, from near the noisiest.
+
+    The last is the schedule's first step for DDIM, clean for DDPM, as their published schedulers
+    have it (leading spacing).
+    """
+    if not 1 <= steps <= schedule.count:
+        raise InputError(f"steps = {steps}: the schedule has 1 to {schedule.count}")
+    stride = schedule.count // steps
+    visited = np.minimum(np.arange(steps)[::-1] * stride + OFFSET, schedule.count - 1)
+    end = 0 if sampler == "ddim" else -1
+    return jnp.asarray([*visited, end], jnp.float32) / (schedule.count - 1)
+
+
+@nnx.jit(static_argnames=("config", "shape"))
+def sample_latents(
+    prior: LatentPrior, told: Array, untold: Array, key: Array, config: PaintConfig, shape: tuple
+) -> Array:
+    """Latents (B, *shape) for text states (B, T, D) with and without the prompt, the same ones for
+    the same key."""
+    schedule, kind = prior.schedule, prior.config.kind
+    first, later = jax.random.split(key)
+    noisy = jax.random.normal(first, (told.shape[0], *shape), jnp.float32)
+    both = TextStates(jnp.concatenate([told, untold]))
+
+    def denoise(noisy: Array, time: Array) -> Array:
+        prediction = prior(jnp.tile(noisy, (2, 1, 1, 1)), jnp.tile(time, 2), both)
+        prediction = guided(*jnp.split(prediction, 2), config.guidance)
+        return interpret(schedule, kind, prediction, noisy, time).clean
+
+    times = sampling_times(schedule, config.steps, config.sampler)
+    eta = 0.0 if config.sampler == "ddim" else 1.0
+    return sample_ddim(denoise, schedule, noisy, times, key=later, eta=eta)
+
+
+@nnx.jit
+def _decode(decoder: Decoder, latents: Array) -> Array:
+    return decoder(latents)
+
+
+def _side(prior: LatentPrior, name: str, pixels: int | None) -> int:
+    """Latents that make up `pixels`."""
+    if pixels is None:
+        return prior.config.side
+    if pixels < 1 or pixels % prior.config.reduction:
+        raise InputError(f"{name} = {pixels}: must be a multiple of {prior.config.reduction}")
+    return pixels // prior.config.reduction
+
+
+def paint(
+    prompt: str,
+    folder: Path,
+    *,
+    negative: str = "",
+    seed: int = 0,
+    config: PaintConfig = PaintConfig(),
+) -> np.ndarray:
+    """A picture (H, W, 3) uint8 of `prompt` by the checkpoint in `folder`; the same for the same
+    seed.
+
+    Raises InputError for a bad setting or an unusable checkpoint.
+    """
+    if not prompt.strip():
+        raise InputError("prompt: is empty; say what to paint, for example 'a strawberry'")
+    states = encode_texts(folder, [prompt, negative])
+    options = {"dtype": config.dtype, "attention_slice": config.attention_slice}
+    prior = load_prior(folder, **options)
+    decoder = load_decoder(folder, **options)
+    sides = [_side(prior, name, getattr(config, name)) for name in ("height", "width")]
+    key = jax.random.key(seed)
+    latents = sample_latents(prior, states[:1], states[1:], key, config, (*sides, 4))
+    latents = (latents / decoder.config.scaling_factor).astype(config.dtype)
+    picture = _decode(decoder, latents)[0]
+    if not bool(jnp.isfinite(picture).all()):
+        raise InputError(f"{folder}: paints no finite picture in {config.dtype}; try float32")
+    return np.asarray(jnp.rint(255 * jnp.clip(0.5 * picture + 0.5, 0, 1))).astype(np.uint8)
