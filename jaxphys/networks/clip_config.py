@@ -60,13 +60,13 @@ class _Tower:
             raise InputError(f"{source}: {error}") from None
 
 
-def _check(name: str, kind: str, value: Any) -> None:
-    if kind == "str":
+def _check(name: str, kind: type, value: Any) -> None:
+    if kind is str:
         good, expected = isinstance(value, str), "a string"
     else:
-        types = int if kind == "int" else (int, float)
+        types = int if kind is int else (int, float)
         good = isinstance(value, types) and not isinstance(value, bool) and value > 0
-        expected = "a positive integer" if kind == "int" else "a positive number"
+        expected = "a positive integer" if kind is int else "a positive number"
     if not good:
         raise InputError(f"{name}: expected {expected}, found {value!r}")
 

@@ -30,13 +30,13 @@ def _sizes(value: Any) -> bool:
 
 # By the annotation of a field: which values it takes, and how to say so.
 KINDS = {
-    "int": (_positive, "a positive integer"),
-    "int | None": (lambda v: v is None or _positive(v), "a positive integer or null"),
-    "float": (_number, "a number of at least 0"),
-    "bool": (lambda v: isinstance(v, bool), "true or false"),
-    "tuple[int, ...]": (_sizes, "a list of positive integers"),
-    "tuple[str, ...]": (lambda v: _list_of(str, v), "a list of names"),
-    "int | tuple[int, ...]": (lambda v: _positive(v) or _sizes(v), "a positive integer or a list"),
+    int: (_positive, "a positive integer"),
+    int | None: (lambda v: v is None or _positive(v), "a positive integer or null"),
+    float: (_number, "a number of at least 0"),
+    bool: (lambda v: isinstance(v, bool), "true or false"),
+    tuple[int, ...]: (_sizes, "a list of positive integers"),
+    tuple[str, ...]: (lambda v: _list_of(str, v), "a list of names"),
+    int | tuple[int, ...]: (lambda v: _positive(v) or _sizes(v), "a positive integer or a list"),
 }
 
 
@@ -115,7 +115,7 @@ class DiffusersConfig:
             raise InputError(f"{name}: {value!r} is not supported, only {_or(plain)}")
 
 
-def _checked(name: str, kind: str, value: Any) -> Any:
+def _checked(name: str, kind: Any, value: Any) -> Any:
     value = tuple(value) if isinstance(value, list) else value
     good, expected = KINDS[kind]
     if not good(value):

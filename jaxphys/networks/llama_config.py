@@ -125,10 +125,14 @@ class LlamaConfig:
                 if field.default is dataclasses.MISSING:
                     raise InputError(f"{source}: {field.name}: is missing")
                 continue
-            kinds = {"int": int, "float": (int, float), "bool": bool}[field.type]
-            wrong_bool = isinstance(value, bool) and field.type != "bool"
-            if not isinstance(value, kinds) or wrong_bool or (field.type != "bool" and value <= 0):
-                kind = "true or false" if field.type == "bool" else "a positive number"
+            kinds = {int: int, float: (int, float), bool: bool}[field.type]
+            wrong_bool = isinstance(value, bool) and field.type is not bool
+            if (
+                not isinstance(value, kinds)
+                or wrong_bool
+                or (field.type is not bool and value <= 0)
+            ):
+                kind = "true or false" if field.type is bool else "a positive number"
                 raise InputError(f"{source}: {field.name}: expected {kind}, found {value!r}")
             given[field.name] = value
         try:

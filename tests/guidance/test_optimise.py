@@ -12,7 +12,7 @@ from jaxphys.guidance.bundled.point_guide import PointGuide
 from jaxphys.guidance.bundled.point_prior import PointPrior, PointPriorConfig
 from jaxphys.guidance.guides import Guides
 from jaxphys.guidance.optimise import OptimiseConfig, draw_views, optimise, start, text_to_gaussians
-from jaxphys.guidance.pictures import draw, neighbour_sizes
+from jaxphys.guidance.pictures import neighbour_sizes, view_picture
 from jaxphys.guidance.views import ELEVATIONS
 
 CONFIG = OptimiseConfig(count=24, room=1.5, steps=4, views=2, density_every=2)
@@ -65,12 +65,13 @@ def test_resumed_run_ends_in_the_same_bytes(guides):
 def test_front_is_seen_from_azimuth_zero():
     """A red dot at the front (+x), a green one at +y, a blue one above."""
     dots = from_points(jnp.eye(3, dtype=jnp.float32) * 0.4, jnp.eye(3), 0.02, opacity=0.99)
-    front = np.asarray(draw(dots, jnp.float32(0), jnp.float32(0), jnp.zeros(3), None).colour)
+    zero, black = jnp.float32(0), jnp.zeros(3)
+    front = np.asarray(view_picture(dots, zero, zero, black, None).colour)
     row, column = np.unravel_index(front[..., 1].argmax(), (64, 64))
     assert abs(row - 32) <= 1 and column > 38  # +y is to the right of who looks along -x
     row, column = np.unravel_index(front[..., 2].argmax(), (64, 64))
     assert abs(column - 32) <= 1 and row < 26
-    side = np.asarray(draw(dots, jnp.float32(np.pi / 2), jnp.float32(0), jnp.zeros(3), None).colour)
+    side = np.asarray(view_picture(dots, jnp.float32(np.pi / 2), zero, black, None).colour)
     assert np.unravel_index(side[..., 0].argmax(), (64, 64))[1] < 26
 
 

@@ -9,11 +9,11 @@ import logging
 import re
 import sys
 import threading
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from time import monotonic
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -65,7 +65,14 @@ class Endpoint:
 
     @cached_property
     def _end(self) -> float:
-        return time.monotonic() + self.seconds
+        return monotonic() + self.seconds
+
+    @property
+    def _late(self) -> str:
+        """What is said when the time is up. The client has a clock of its own for every single
+        wait, lest a thread be left behind: whichever is first, the cause is the same.
+        """
+        return f"no answer within {self.seconds:g} s"
 
     def instruction(self, prompt: str) -> str:
         """The context part with the prompt, then the task part, as in the paper."""
@@ -91,10 +98,9 @@ class Endpoint:
             "seed": attempt,
         }
         outcome: dict[str, Any] = {}
-        late = Unanswered(f"no answer within {self.seconds:g} s")
-        left = self._end - time.monotonic()
+        left = self._end - monotonic()
         if left <= 0:
-            raise late
+            raise Unanswered(self._late)
         client = self._client(left)
         thread = threading.Thread(target=self._fill, args=(outcome, client, body), daemon=True)
         try:
@@ -105,7 +111,7 @@ class Endpoint:
         finally:
             client.close()  # ends what the thread may still be reading
         if thread.is_alive():
-            raise late
+            raise Unanswered(self._late)
         if "error" in outcome:
             raise outcome["error"]
         if "problem" in outcome:
@@ -147,7 +153,9 @@ class Endpoint:
             outcome["problem"] = f"answered with status {error.status_code}"
         except Unanswered as error:
             outcome["problem"] = str(error)
-        except (openai.OpenAIError, *_transport_errors()) as error:
+        except (openai.APITimeoutError, *_transport_errors("TimeoutException"), TimeoutError):
+            outcome["problem"] = self._late
+        except (openai.OpenAIError, *_transport_errors("HTTPError"), OSError) as error:
             # Its text may hold anything that was sent; its kind says enough.
             outcome["problem"] = f"cannot be reached ({type(error).__name__})"
         except Exception as error:
@@ -160,15 +168,15 @@ class Endpoint:
                 reply += part
                 if len(reply) > LONGEST_REPLY:
                     raise Unanswered(f"answered more than {LONGEST_REPLY} bytes")
-                if time.monotonic() > self._end:
-                    raise Unanswered(f"no answer within {self.seconds:g} s")
+                if monotonic() > self._end:
+                    raise Unanswered(self._late)
         return reply
 
 
-def _transport_errors() -> tuple[type[Exception], ...]:
-    """Of the library beneath the client: httpx, or httpx2 since openai 3."""
-    libraries = [sys.modules[name] for name in ("httpx", "httpx2") if name in sys.modules]
-    return (OSError, *(library.HTTPError for library in libraries))
+def _transport_errors(name: str) -> tuple[type[Exception], ...]:
+    """An exception of the library beneath the client: httpx, or httpx2 since openai 3."""
+    libraries = [sys.modules[library] for library in ("httpx", "httpx2") if library in sys.modules]
+    return tuple(getattr(library, name) for library in libraries)
 
 
 def _content(reply: bytes) -> str:

@@ -100,7 +100,7 @@ def test_an_unusable_answer_is_asked_for_again(server):
 
 
 def hang(handler):
-    time.sleep(30)
+    time.sleep(60)
 
 
 def drip(handler):
@@ -147,9 +147,6 @@ def elsewhere(handler):
 @pytest.mark.parametrize(
     ("behave", "said"),
     [
-        (hang, "no answer within 1 s"),
-        (drip, "no answer within 1 s"),
-        (drip_headers, "no answer within 1 s"),
         (endless, f"more than {LONGEST_REPLY} bytes"),
         (ten_megabytes, f"more than {LONGEST_REPLY} bytes"),
         (squeezed, f"more than {LONGEST_REPLY} bytes"),
@@ -169,12 +166,8 @@ def elsewhere(handler):
     ],
 )
 def test_failures_fall_through_to_the_rules(server, behave, said):
-    server.environment["JAXPHYS_LLM_TIMEOUT"] = "1"
     server.behave = behave
-    find_endpoint(server.environment)  # imports the client, which takes its time
-    begin = time.monotonic()
     result = refine("a rose", server.environment)
-    assert time.monotonic() - begin < 5
     assert result.refined == refine("a rose", {}, "rules").refined and result.how.startswith(
         "offline"
     )
@@ -184,29 +177,49 @@ def test_failures_fall_through_to_the_rules(server, behave, said):
     assert len(server.seen) == 1
 
 
+@pytest.mark.parametrize("behave", [hang, drip, drip_headers])
+@pytest.mark.parametrize("patience", [0.2, 600.0])
+def test_a_wait_in_vain_is_told_alike_by_either_clock(server, monkeypatch, behave, patience):
+    """The client's clock for a single wait and ours for the whole answer: each is made the first in
+    turn. Against drips the client's never rings.
+    """
+    client = Endpoint._client
+    monkeypatch.setattr(Endpoint, "_client", lambda self, seconds: client(self, patience))
+    quick = patience < 1 and behave is hang
+    seconds = 600 if quick else 1
+    server.environment["JAXPHYS_LLM_TIMEOUT"] = str(seconds)
+    server.behave = behave
+    find_endpoint(server.environment)  # imports the client, which takes its time
+    (attempt,) = refine("a rose", server.environment).attempts
+    assert attempt.problem == f"no answer within {seconds} s"
+
+
 def test_whoever_is_left_waiting_is_hung_up_on(server):
     server.environment["JAXPHYS_LLM_TIMEOUT"] = "0.5"
     server.behave = drip_headers
     before = threading.active_count()
     refine("a rose", server.environment)
-    for _ in range(100):
+    for _ in range(1200):
         if server.cut_off and threading.active_count() <= before:
             return
         time.sleep(0.05)
     pytest.fail("the connection or the thread outlives the question")
 
 
-def test_the_time_is_for_all_answers_together(server):
+def test_the_time_is_for_all_answers_together(server, monkeypatch):
+    """By a clock that the server moves on by 200 s an answer."""
+    passed = [0.0]
+    monkeypatch.setattr("jaxphys.guidance.prompts.endpoint.monotonic", lambda: passed[0])
+
     def slow(handler):
-        time.sleep(2.0)
+        passed[0] += 200.0
         handler.reply(completion("no"))
 
-    server.environment["JAXPHYS_LLM_TIMEOUT"] = "5"
+    server.environment["JAXPHYS_LLM_TIMEOUT"] = "500"
     server.behave = slow
-    find_endpoint(server.environment)
     result = refine("a rose", server.environment)
-    # With 5 s for each, all three answers would have come.
-    assert result.attempts[-1].problem == "no answer within 5 s"
+    # With 500 s for each, all three answers would have come.
+    assert result.attempts[-1].problem == "no answer within 500 s" and len(server.seen) == ATTEMPTS
     assert "has 1 words" in result.attempts[0].problem
 
 
