@@ -18,14 +18,25 @@ from jaxphys.weights.safetensors_files import open_arrays
 TURN, END_OF_TURN = "<|im_start|>", "<|im_end|>"
 
 
+# Types of a GGUF file's tokens that are parts of texts; the others are marks, or fill the table up.
+NORMAL, USER_DEFINED, BYTE = 1, 4, 6
+
+
 class LanguageFiles(NamedTuple):
-    """`ends` are the ids of the tokens after which an answer is over."""
+    """What files hold of a language model.
+
+    Attributes:
+        ends: ids of the tokens after which an answer is over.
+        sayable: ids of the tokens that an answer may be made of: no marks, no rows of the
+            network's table that stand for nothing.
+    """
 
     name: str
     config: LlamaConfig
     arrays: Mapping[str, np.ndarray]
     tokenizer: Tokenizer
     ends: frozenset[int]
+    sayable: frozenset[int]
 
 
 def open_language_files(path: str | Path) -> LanguageFiles:
@@ -57,11 +68,13 @@ def _from_gguf(path: Path) -> LanguageFiles:
     config = LlamaConfig.from_gguf(file.metadata, str(path))
     config = dataclasses.replace(config, tie_word_embeddings="lm_head.weight" not in file.arrays)
     tokenizer = tokenizer_from_gguf(file.metadata, str(path))
+    types = enumerate(file.metadata["tokenizer.ggml.token_type"])
     return _language_files(
         path.stem,
         config,
         file.arrays,
         tokenizer,
+        {token for token, kind in types if kind in (NORMAL, USER_DEFINED, BYTE)},
         [file.metadata.get("tokenizer.ggml.eos_token_id")],
         file.metadata.get("tokenizer.chat_template"),
         str(path),
@@ -88,8 +101,11 @@ def _from_folder(path: Path) -> LanguageFiles:
     generation = path / "generation_config.json"
     known = read_json(generation) if generation.exists() else {}
     ends = [end for found in (values, known) for end in _list(found.get("eos_token_id"))]
+    added = tokenizer.get_added_tokens_decoder()
+    marks = {token for token, mark in added.items() if mark.special}
+    sayable = set(tokenizer.get_vocab().values()) - marks
     return _language_files(
-        path.name, config, open_arrays(path), tokenizer, ends, template, str(path)
+        path.name, config, open_arrays(path), tokenizer, sayable, ends, template, str(path)
     )
 
 
@@ -102,6 +118,7 @@ def _language_files(
     config: LlamaConfig,
     arrays: Mapping[str, np.ndarray],
     tokenizer: Tokenizer,
+    sayable: set[int],
     ends: list,
     template: Any,
     source: str,
@@ -111,10 +128,12 @@ def _language_files(
         raise InputError(
             f"{source}: is not made for conversations in the ChatML form ({TURN} ... {END_OF_TURN})"
         )
-    if tokenizer.get_vocab_size() > config.vocab_size:
+    tokens = max(tokenizer.get_vocab().values()) + 1
+    if tokens > config.vocab_size:
         raise InputError(
-            f"{source}: the tokenizer has {tokenizer.get_vocab_size()} tokens,"
-            f" the network {config.vocab_size}; they do not belong together"
+            f"{source}: the tokenizer has {tokens} tokens, the network {config.vocab_size};"
+            " they do not belong together"
         )
     known = {end for end in ends if isinstance(end, int) and 0 <= end < config.vocab_size}
-    return LanguageFiles(name, config, arrays, tokenizer, frozenset({*known, *marks}))
+    over = frozenset({*known, *marks})
+    return LanguageFiles(name, config, arrays, tokenizer, over, frozenset(sayable) - over)

@@ -127,14 +127,14 @@ def _draw(
 class LanguageModel:
     """A Llama network trained on conversations in the ChatML form, and its tokenizer."""
 
-    def __init__(self, checkpoint: LanguageFiles, model: Llama):
+    def __init__(self, files: LanguageFiles, model: Llama):
         """Takes the model over: its layers are moved out of it."""
-        self.name = checkpoint.name
-        self.config = checkpoint.config
-        self._tokenizer = checkpoint.tokenizer
+        self.name = files.name
+        self.config = files.config
+        self._tokenizer = files.tokenizer
         # What a user writes never becomes a mark, whatever it looks like.
         self._tokenizer.encode_special_tokens = True
-        self._ends = checkpoint.ends
+        self._ends, self._sayable = files.ends, files.sayable
         blocks = list(model.model.layers)
         self._pass, _ = _compiled(blocks[0], _pass, donate=[2])
         self._blocks = [jax.tree.leaves(nnx.state(block)) for block in blocks]
@@ -263,9 +263,7 @@ class LanguageModel:
 
     def _bias(self, only: str | None) -> np.ndarray:
         """What is added to each token's logarithmic probability at first: -inf forbids."""
+        allowed = self._sayable if only is None else self._sayable & {*self._ids(only)}
         bias = np.full(self.config.vocab_size, -np.inf, self._dtype)
-        bias[: self._tokenizer.get_vocab_size()] = 0.0
-        if only is not None:
-            allowed = [*self._ids(only), *self._ends]
-            bias[np.setdiff1d(np.arange(len(bias)), allowed)] = -np.inf
+        bias[[*allowed, *self._ends]] = 0.0
         return bias

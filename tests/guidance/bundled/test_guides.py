@@ -56,7 +56,7 @@ def test_point_distillation_reaches_points_and_colours_only():
         config = DistillationConfig()
         return point_distillation(prior, points, colours, text, jax.random.key(0), config).value
 
-    to_points, to_colours, to_text = jax.grad(loss, (0, 1, 2))(points, colours, text)
+    to_points, to_colours, to_text = jax.jit(jax.grad(loss, (0, 1, 2)))(points, colours, text)
     for part in (to_points, to_colours):
         assert np.isfinite(part).all() and np.all(np.abs(part).max(1) > 0)
     np.testing.assert_array_equal(to_text, 0.0)

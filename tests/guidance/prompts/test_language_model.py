@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from flax import nnx
 from safetensors.numpy import save_file
+from tokenizers import AddedToken, Tokenizer
 
 from experiments.parity.arrays import weights
 from jaxphys.core.errors import InputError
@@ -66,18 +67,61 @@ def test_what_a_user_writes_never_becomes_a_mark(model):
     assert ids.count(TOKENS.index("<|im_end|>")) == 1
 
 
-def test_the_answer_is_the_likeliest_token_time_after_time(model, tokenizer):
+@pytest.fixture(scope="module")
+def likeliest():
+    """(ids, count, forbidden) -> the next tokens, by the whole network read anew for each."""
     config = LlamaConfig.from_json(CONFIG, "tiny")
     arrays = JoinedArrays(ARRAYS, JOINED, source="tiny")
     network = fill(lambda: Llama(config), arrays, source="tiny")
     read = nnx.jit(lambda ids: network.logits(network(ids, empty_cache(config, 128), 0)[0]))
-    ids, count = model.conversation(ASKED), 6
-    start = len(ids)
-    for _ in range(count):
-        padded = np.pad(ids, (0, 128 - len(ids)))
-        ids.append(int(np.argmax(read(padded[None])[0, len(ids) - 1])))
-    assert not {0, 1, 2} & set(ids[start:])  # else the answer would have ended
-    assert model.answer(ASKED, max_tokens=count) == tokenizer.decode(ids[start:])
+
+    def tokens(ids: list[int], count: int, forbidden=()) -> list[int]:
+        start = len(ids)
+        for _ in range(count):
+            padded = np.pad(ids, (0, 128 - len(ids)))
+            logits = np.array(read(padded[None])[0, len(ids) - 1])
+            logits[list(forbidden)] = -np.inf
+            ids = [*ids, int(np.argmax(logits))]
+        assert not {0, 1, 2} & set(ids[start:])  # else the answer would have ended
+        return ids[start:]
+
+    return tokens
+
+
+def test_the_answer_is_the_likeliest_token_time_after_time(model, tokenizer, likeliest):
+    expected = likeliest(model.conversation(ASKED), 6)
+    assert model.answer(ASKED, max_tokens=6) == tokenizer.decode(expected)
+
+
+@pytest.mark.parametrize("kind", [2, 3, 5], ids=["unknown", "control", "unused"])
+def test_tokens_that_are_no_text_are_never_said(model, tokenizer, likeliest, tmp_path, kind):
+    """The likeliest is marked as of another kind; nothing else differs."""
+    asked = model.conversation(ASKED)
+    (first,) = likeliest(asked, 1)
+    types = [3] * len(MARKS) + [1] * (len(TOKENS) - len(MARKS))
+    types[first] = kind
+    path = write_gguf(tmp_path / "tiny.gguf", ARRAYS, tokenizer__ggml__token_type=types)
+    found = LanguageModel.load(path).answer(ASKED, max_tokens=4)
+    assert found == tokenizer.decode(likeliest(asked, 4, [first]))
+    assert found != model.answer(ASKED, max_tokens=4)
+
+
+def test_marks_of_a_folder_and_rows_without_a_token_are_never_said(
+    model, tokenizer, likeliest, tmp_path
+):
+    asked = model.conversation(ASKED)
+    (first,) = likeliest(asked, 1)
+    expected = tokenizer.decode(likeliest(asked, 4, [first]))
+    marked = Tokenizer.from_str(tokenizer.to_str())
+    marked.add_special_tokens([AddedToken(TOKENS[first], special=True, normalized=False)])
+    folder = LanguageModel.load(write_folder(tmp_path / "marked", marked))
+    assert folder.answer(ASKED, max_tokens=4) == expected
+    # A vocabulary with a hole: the network has a row where the tokenizer has no token.
+    holed = json.loads(tokenizer.to_str())
+    assert holed["model"]["vocab"].pop(TOKENS[first]) == first
+    holed = Tokenizer.from_str(json.dumps(holed))
+    folder = LanguageModel.load(write_folder(tmp_path / "holed", holed))
+    assert folder.answer(ASKED, max_tokens=4) == expected
 
 
 def test_both_layouts_answer_alike(file, model, tokenizer, tmp_path):
