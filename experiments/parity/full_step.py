@@ -18,10 +18,10 @@ from experiments.parity.full_size import random_weights
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.guidance.bundled.point_guide import bundled_shape_guide
 from jaxphys.guidance.choice import LATENT
-from jaxphys.guidance.diffusion.discrete_schedule import DiscreteSchedule
 from jaxphys.guidance.guides import Guides
 from jaxphys.guidance.optimise import advance, start
 from jaxphys.guidance.pictures import neighbour_sizes, room_for_pairs
+from jaxphys.guidance.published.scheduler_config import SchedulerConfig
 from jaxphys.guidance.published.stable_diffusion import (
     LatentPrior,
     LatentPriorConfig,
@@ -31,6 +31,9 @@ from jaxphys.networks.autoencoder import AutoencoderConfig, Encoder
 from jaxphys.networks.unet import UNet, UNetConfig
 
 GIB = 2**30
+STABLE_DIFFUSION = SchedulerConfig(
+    beta_schedule="scaled_linear", beta_start=0.00085, beta_end=0.012, clip_sample=False
+)
 
 
 def peak() -> float:
@@ -52,7 +55,7 @@ def full_guide(attention_slice: int | None) -> StableDiffusionGuide:
         **options,
     )
     encoder = nnx.merge(*random_weights(lambda: Encoder(vae), 1))
-    prior = LatentPrior(unet, DiscreteSchedule(), LatentPriorConfig("noise", 64, 8))
+    prior = LatentPrior(unet, LatentPriorConfig(STABLE_DIFFUSION, 64, 8))
     return StableDiffusionGuide(prior, encoder, jax.random.normal(jax.random.key(2), (5, 77, 768)))
 
 

@@ -7,10 +7,12 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from jaxphys.core.errors import InputError
-from jaxphys.guidance.diffusion.schedule import Schedule
+from jaxphys.guidance.diffusion.schedule import Estimate, Schedule
 
 Denoise = Callable[[Array, Array], Array]
 """(noisy (B, ...), time (B,)) -> estimate of the clean sample (B, ...)."""
+EstimateAt = Callable[[Array, Array], Estimate]
+"""(noisy (B, ...), time (B,)) -> estimates of the clean sample and of the noise."""
 
 
 def karras_ratios(steps: int, largest: float, smallest: float, rho: float) -> Array:
@@ -34,17 +36,23 @@ def _as_batch(time: Array, noisy: Array) -> Array:
 
 
 def sample_ddim(
-    denoise: Denoise,
+    estimate: EstimateAt,
     schedule: Schedule,
     noisy: Array,
     times: Array,
+    reached: Array,
     *,
     key: Array | None = None,
     eta: float = 0.0,
 ) -> Array:
-    """DDIM (Song et al. 2021, eq. 12 and 16) from `times[0]` to `times[-1]`.
+    """DDIM (Song et al. 2021, eq. 12 and 16): from each of `times` to the one in `reached`.
 
-    noisy: (B, ...) sample at `times[0]`. eta: 0 deterministic, 1 ancestral (then `key` is needed).
+    Args:
+        estimate: what the network believes, asked once a step.
+        noisy: (B, ...) sample at `times[0]`.
+        times: (steps,) falling.
+        reached: (steps,) where each step leads, not always exactly where the next one starts.
+        eta: 0 deterministic, 1 ancestral (then `key` is needed).
     """
     if eta and key is None:
         raise InputError("sample_ddim with eta > 0 draws noise: give it a key")
@@ -53,8 +61,7 @@ def sample_ddim(
         now, later, index = spans
         alpha, sigma = (s.astype(noisy.dtype) for s in schedule.alpha_sigma(now))
         alpha_next, sigma_next = (s.astype(noisy.dtype) for s in schedule.alpha_sigma(later))
-        clean = denoise(noisy, _as_batch(now, noisy))
-        noise = (noisy - alpha * clean) / sigma
+        clean, noise = estimate(noisy, _as_batch(now, noisy))
         if eta:
             kept = jnp.maximum(1.0 - (alpha / alpha_next) ** 2, 0.0)
             fresh = jnp.minimum(eta * sigma_next / sigma * jnp.sqrt(kept), sigma_next)
@@ -64,8 +71,7 @@ def sample_ddim(
             noise = sigma_next * noise
         return alpha_next * clean + noise, None
 
-    spans = (times[:-1], times[1:], jnp.arange(len(times) - 1))
-    return lax.scan(step, noisy, spans)[0]
+    return lax.scan(step, noisy, (times, reached, jnp.arange(len(times))))[0]
 
 
 def sample_heun(denoise: Denoise, schedule: Schedule, noisy: Array, times: Array) -> Array:

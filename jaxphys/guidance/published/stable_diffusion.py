@@ -14,15 +14,14 @@ import jax.numpy as jnp
 from flax import nnx
 from jax import Array
 
-from jaxphys.core.errors import InputError, nearest
 from jaxphys.core.files import read_json
-from jaxphys.guidance.diffusion.discrete_schedule import DiscreteSchedule
 from jaxphys.guidance.diffusion.schedule import Kind
 from jaxphys.guidance.diffusion.score_distillation import (
     Distillation,
     DistillationConfig,
     score_distillation,
 )
+from jaxphys.guidance.published.scheduler_config import SchedulerConfig
 from jaxphys.networks import autoencoder, clip_text, unet
 from jaxphys.networks.clip_tokenizer import ClipTokenizer
 from jaxphys.networks.parameters import fill
@@ -30,7 +29,6 @@ from jaxphys.weights.safetensors_files import open_arrays
 
 PARTS = ("tokenizer", "text_encoder", "unet", "vae", "scheduler")
 VIEWS = ("front view", "side view", "back view", "overhead view")
-KINDS: dict[str, Kind] = {"epsilon": "noise", "v_prediction": "velocity"}
 OVERHEAD = jnp.pi / 3  # elevation from which a view is one from above; GSGEN's rule
 
 
@@ -42,19 +40,25 @@ class TextStates(NamedTuple):
 
 @dataclass(frozen=True)
 class LatentPriorConfig:
-    """What the network predicts, the side of the latents it was trained on, and how many pixels
-    of a picture a latent stands for, each way."""
+    """How it is sampled, the side of the latents it was trained on, and how many pixels of a
+    picture a latent stands for, each way."""
 
-    kind: Kind
+    scheduler: SchedulerConfig
     side: int
     reduction: int
+
+    @property
+    def kind(self) -> Kind:
+        """What the network predicts."""
+        return self.scheduler.kind
 
 
 class LatentPrior(nnx.Module):
     """Denoiser of (B, H, W, 4) latents: the network, and the schedule it was trained with."""
 
-    def __init__(self, network: unet.UNet, schedule: DiscreteSchedule, config: LatentPriorConfig):
-        self.network, self.schedule, self.config = network, schedule, config
+    def __init__(self, network: unet.UNet, config: LatentPriorConfig):
+        self.network, self.config = network, config
+        self.schedule = config.scheduler.schedule()
 
     def __call__(self, noisy: Array, time: Array, condition: TextStates) -> Array:
         """Predicts what `config.kind` says of `noisy` at `time` (B,) in [0, 1]."""
@@ -124,7 +128,7 @@ def load_prior(
     Raises:
         InputError: a file is missing, damaged, or of another network.
     """
-    schedule, kind = load_schedule(folder)
+    scheduler = load_scheduler(folder)
     source = Path(folder) / "unet"
     config = unet.UNetConfig.from_json(
         read_json(source / "config.json") | {"attention_slice": attention_slice},
@@ -139,28 +143,13 @@ def load_prior(
     )
     vae = _autoencoder_config(folder)
     reduction = 2 ** (len(vae.block_out_channels) - 1)
-    return LatentPrior(network, schedule, LatentPriorConfig(kind, config.sample_size, reduction))
+    return LatentPrior(network, LatentPriorConfig(scheduler, config.sample_size, reduction))
 
 
-def load_schedule(folder: Path) -> tuple[DiscreteSchedule, Kind]:
-    """The schedule of `scheduler/scheduler_config.json`, and what the network predicts.
-
-    Raises InputError for a schedule or a prediction that is not known here.
-    """
+def load_scheduler(folder: Path) -> SchedulerConfig:
+    """What `scheduler/scheduler_config.json` says. Raises InputError as `SchedulerConfig`."""
     source = Path(folder) / "scheduler" / "scheduler_config.json"
-    found = read_json(source)
-    kind = found.get("prediction_type", "epsilon")
-    if kind not in KINDS:
-        raise InputError(f"{source}: prediction_type {kind!r}; {nearest(str(kind), KINDS)}")
-    if found.get("trained_betas") is not None or found.get("rescale_betas_zero_snr"):
-        raise InputError(f"{source}: trained_betas and rescale_betas_zero_snr are not supported")
-    schedule = DiscreteSchedule(
-        kind=found.get("beta_schedule", "linear"),
-        count=found.get("num_train_timesteps", 1000),
-        first=found.get("beta_start", 1e-4),
-        last=found.get("beta_end", 2e-2),
-    )
-    return schedule, KINDS[kind]
+    return SchedulerConfig.from_json(read_json(source), str(source))
 
 
 def _autoencoder_config(

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -13,7 +12,8 @@ from jax import Array
 from jaxphys.core.errors import InputError, nearest
 from jaxphys.guidance.diffusion.discrete_schedule import DiscreteSchedule
 from jaxphys.guidance.diffusion.samplers import sample_ddim
-from jaxphys.guidance.diffusion.schedule import guided, interpret
+from jaxphys.guidance.diffusion.schedule import Estimate, guided, interpret
+from jaxphys.guidance.published.scheduler_config import SAMPLERS, Sampler, SchedulerConfig
 from jaxphys.guidance.published.stable_diffusion import (
     LatentPrior,
     TextStates,
@@ -22,10 +22,6 @@ from jaxphys.guidance.published.stable_diffusion import (
     load_prior,
 )
 from jaxphys.networks.autoencoder import Decoder
-
-Sampler = Literal["ddim", "ddpm"]
-SAMPLERS = ("ddim", "ddpm")
-OFFSET = 1  # of the sampled steps, as the published schedulers' `steps_offset`
 
 
 @dataclass(frozen=True)
@@ -57,18 +53,26 @@ class PaintConfig:
             raise InputError(f"steps = {self.steps}: needs at least one")
 
 
-def sampling_times(schedule: DiscreteSchedule, steps: int, sampler: Sampler) -> Array:
-    """(steps + 1,) falling times: every so-many steps of the schedule, from near the noisiest.
+def clipped(
+    schedule: DiscreteSchedule,
+    scheduler: SchedulerConfig,
+    sampler: Sampler,
+    estimate: Estimate,
+    noisy: Array,
+    time: Array,
+) -> Estimate:
+    """An estimate with its clean sample clipped as the scheduler asks.
 
-    The last is the schedule's first step for DDIM, clean for DDPM, as their published schedulers
-    have it (leading spacing).
+    DDIM goes on with the noise that the network saw, DDPM's mean is one of the clipped sample and
+    the noisy one (Ho et al. 2020, eq. 7): with the noise that lies between these.
     """
-    if not 1 <= steps <= schedule.count:
-        raise InputError(f"steps = {steps}: the schedule has 1 to {schedule.count}")
-    stride = schedule.count // steps
-    visited = np.minimum(np.arange(steps)[::-1] * stride + OFFSET, schedule.count - 1)
-    end = 0 if sampler == "ddim" else -1
-    return jnp.asarray([*visited, end], jnp.float32) / (schedule.count - 1)
+    if not scheduler.clip_sample:
+        return estimate
+    limit = scheduler.clip_sample_range
+    clean = jnp.clip(estimate.clean, -limit, limit)
+    if sampler == "ddim":
+        return estimate._replace(clean=clean)
+    return interpret(schedule, "clean", clean, noisy, time)
 
 
 @nnx.jit(static_argnames=("config", "shape"))
@@ -77,19 +81,21 @@ def sample_latents(
 ) -> Array:
     """Latents (B, *shape) for text states (B, T, D) with and without the prompt, the same ones for
     the same key."""
-    schedule, kind = prior.schedule, prior.config.kind
+    schedule, scheduler, kind = prior.schedule, prior.config.scheduler, prior.config.kind
     first, later = jax.random.split(key)
     noisy = jax.random.normal(first, (told.shape[0], *shape), jnp.float32)
     both = TextStates(jnp.concatenate([told, untold]))
 
-    def denoise(noisy: Array, time: Array) -> Array:
+    def estimate(noisy: Array, time: Array) -> Estimate:
         prediction = prior(jnp.tile(noisy, (2, 1, 1, 1)), jnp.tile(time, 2), both)
         prediction = guided(*jnp.split(prediction, 2), config.guidance)
-        return interpret(schedule, kind, prediction, noisy, time).clean
+        found = interpret(schedule, kind, prediction, noisy, time)
+        return clipped(schedule, scheduler, config.sampler, found, noisy, time)
 
-    times = sampling_times(schedule, config.steps, config.sampler)
+    spans = scheduler.visited(config.steps, config.sampler)
+    times, reached = (jnp.asarray(steps, jnp.float32) / (schedule.count - 1) for steps in spans)
     eta = 0.0 if config.sampler == "ddim" else 1.0
-    return sample_ddim(denoise, schedule, noisy, times, key=later, eta=eta)
+    return sample_ddim(estimate, schedule, noisy, times, reached, key=later, eta=eta)
 
 
 @nnx.jit

@@ -108,13 +108,22 @@ def exact(schedule):
     return denoise
 
 
+def along(denoise, schedule, noisy, times, **options):
+    """`sample_ddim` from each time to the next, with the noise that a clean sample means."""
+
+    def estimate(noisy, time):
+        return interpret(schedule, "clean", denoise(noisy, time), noisy, time)
+
+    return sample_ddim(estimate, schedule, noisy, times[:-1], times[1:], **options)
+
+
 @pytest.mark.parametrize("shift", [1.0, 0.5])
 def test_heun_and_ddim_recover_a_gaussian(shift):
     schedule, count = Schedule(shift), 4000
     noise = jax.random.normal(jax.random.key(0), (count, 2))
     times = karras_times(schedule, 40, 200.0, 0.002, 7.0)
     heun = sample_heun(exact(schedule), schedule, noise, times)
-    ddim = sample_ddim(exact(schedule), schedule, noise, times)
+    ddim = along(exact(schedule), schedule, noise, times)
     # The flow of a Gaussian is affine: every sample's end is known, not only the distribution.
     wanted = MEAN + SPREAD * noise
     assert np.abs(heun - wanted).max() < 0.05
@@ -141,13 +150,13 @@ def test_ancestral_ddim_recovers_mean_and_spread():
     schedule = Schedule()
     noise = jax.random.normal(jax.random.key(2), (20000, 2))
     times = karras_times(schedule, 120, 80.0, 0.01, 7.0)
-    drawn = sample_ddim(exact(schedule), schedule, noise, times, key=jax.random.key(3), eta=1.0)
+    drawn = along(exact(schedule), schedule, noise, times, key=jax.random.key(3), eta=1.0)
     np.testing.assert_allclose(drawn.mean(0), MEAN, atol=0.02)
     # First order in the step: 120 of them leave some 6% of the spread.
     np.testing.assert_allclose(drawn.std(0), SPREAD, rtol=0.08)
     assert np.abs(np.corrcoef(drawn[:, 0], noise[:, 0])[0, 1]) < 0.5  # the noise was redrawn
     with pytest.raises(InputError, match="key"):
-        sample_ddim(exact(schedule), schedule, noise, times, eta=1.0)
+        along(exact(schedule), schedule, noise, times, eta=1.0)
 
 
 def test_samplers_keep_float32():
@@ -160,4 +169,4 @@ def test_samplers_keep_float32():
     noise = jnp.ones((2, 3), jnp.float32)
     times = karras_times(schedule, 4, 50.0, 0.01, 7.0)
     assert sample_heun(denoise, schedule, noise, times).dtype == jnp.float32
-    assert sample_ddim(denoise, schedule, noise, times).dtype == jnp.float32
+    assert along(denoise, schedule, noise, times).dtype == jnp.float32

@@ -15,7 +15,6 @@ from jaxphys.guidance.published.stable_diffusion import (
     encode_picture,
     encode_texts,
     load_prior,
-    load_schedule,
     stable_diffusion_guide,
     view_index,
 )
@@ -129,21 +128,6 @@ def test_attention_in_slices_and_half_precision(guide, folder, images):
     found = distil(half, images, *VIEW, key).gradient
     assert found.dtype == jnp.float32
     assert np.abs(found - whole).max() < 0.1 * np.abs(whole).max()
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"prediction_type": "sample"}, "prediction_type 'sample'"),
-        ({"beta_schedule": "sigmoid"}, "unknown schedule 'sigmoid'"),
-        ({"rescale_betas_zero_snr": True}, "rescale_betas_zero_snr"),
-    ],
-)
-def test_other_schedules_are_refused(tmp_path, changes, said):
-    path = tmp_path / "scheduler" / "scheduler_config.json"
-    checkpoints.write_json(path, checkpoints.SCHEDULER | changes)
-    with pytest.raises(InputError, match=said):
-        load_schedule(tmp_path)
 
 
 def test_prediction_of_velocity_is_read_from_the_folder(tmp_path):
