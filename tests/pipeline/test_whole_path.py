@@ -13,8 +13,8 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.splats import Splats
 from jaxphys.gaussians.gaussians import covariances, from_points, opacities
 from jaxphys.gaussians.harmonics import dc_to_rgb
-from jaxphys.mpm.frames import rollout_frames
-from jaxphys.mpm.rollout import SimulationError, rollout
+from jaxphys.mpm.frames import advance_frame, rollout_frames
+from jaxphys.mpm.rollout import SimulationError
 from jaxphys.pipeline.draw import deformed_gaussians, draw
 from jaxphys.pipeline.frames import simulate
 from jaxphys.render.camera import orbit
@@ -85,12 +85,8 @@ def test_pictures_show_every_gaussian_on_its_own_particle(which, request):
     state = simulation.state
     for frame in range(3):
         if frame:
-            state = rollout(
-                simulation.config,
-                simulation.model,
-                state,
-                dt=simulation.dt,
-                steps=simulation.steps,
+            state = advance_frame(
+                simulation.config, simulation.model, state, simulation.dt, simulation.steps
             )
         image = draw(look, motion[frame], CAMERA, background=1.0)
         expected = brute_force_picture(simulation, look, state)
@@ -167,8 +163,8 @@ def test_with_refuses_what_cannot_be(hollow, changes, message):
 def test_the_step_follows_known_numbers_and_traced_ones_show_that_it_does_not(hollow):
     simulation, look = hollow
     stiff = simulation.with_(youngs_modulus=1e7)
-    # Speed of sound grows by a hundred.
-    assert stiff.dt < 0.03 * simulation.dt
+    # Sound is a hundred times as fast; the first step was bounded by the spin.
+    assert stiff.dt < 0.1 * simulation.dt
     assert stiff.dt * stiff.steps == pytest.approx(0.02)
     back = stiff.with_(youngs_modulus=1e3)
     assert (back.dt, back.steps) == (simulation.dt, simulation.steps)
