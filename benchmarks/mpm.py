@@ -15,7 +15,7 @@ from benchmarks.case import Case, Prepared
 LAWS = {
     "neo-Hookean": ("elasticity.NEO_HOOKEAN", {}),
     "fixed corotated": ("elasticity.FIXED_COROTATED", {}),
-    "metal": ("plasticity.VON_MISES", {"yield_stress": 1e3, "hardening": 0.0}),
+    "metal": ("plasticity.VON_MISES", {"yield_stress": 1.2e3, "hardening": 0.0}),
     "sand": ("plasticity.DRUCKER_PRAGER", {"friction_angle": 35.0}),
 }
 PEER_LAWS = ("neo-Hookean", "fixed corotated")

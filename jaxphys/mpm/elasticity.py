@@ -121,11 +121,26 @@ def hencky_principal_energy(parameters: Parameters, stretches: Array) -> Array:
     return hencky_density(*lame(parameters), jnp.log(jnp.abs(stretches)))
 
 
-def _elastic(name, stress, energy, principal_energy) -> Law:
+def without_memory(energy):
+    """The energy of a law whose history stores none."""
+    return lambda parameters, F, history: energy(parameters, F)
+
+
+def _elastic(name, stress, energy, principal_energy, spectral=False) -> Law:
     def update(parameters, F_trial, history):
         return F_trial, stress(parameters, F_trial), history
 
-    return Law(name, ELASTIC_PARAMETERS, (), (), update, energy, principal_energy, plastic=False)
+    return Law(
+        name=name,
+        parameters=ELASTIC_PARAMETERS,
+        history=(),
+        history_names=(),
+        update=update,
+        energy=without_memory(energy),
+        principal_energy=principal_energy,
+        plastic=False,
+        spectral=spectral,
+    )
 
 
 NEO_HOOKEAN = _elastic(
@@ -137,4 +152,4 @@ FIXED_COROTATED = _elastic(
     fixed_corotated_energy,
     fixed_corotated_principal_energy,
 )
-HENCKY = _elastic("Hencky", hencky_stress, hencky_energy, hencky_principal_energy)
+HENCKY = _elastic("Hencky", hencky_stress, hencky_energy, hencky_principal_energy, spectral=True)

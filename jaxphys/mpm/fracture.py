@@ -11,7 +11,7 @@ from jaxphys.core.parts import connected_parts
 from jaxphys.core.spectral import left_isotropic
 from jaxphys.mpm.elasticity import (
     ELASTIC_PARAMETERS,
-    hencky_energy,
+    hencky_density,
     hencky_principal_energy,
     lame,
 )
@@ -86,19 +86,20 @@ def _fracture_update(parameters: Parameters, F_trial: Array, history: Array):
     return apply_change(change, F_trial), stress, jnp.stack(kept)
 
 
-def _damaged_energy_value(e, arguments):
+def _energy_value(e, arguments):
     mu, lam, damage = arguments
     stretch, squeeze, swelling, shrinking = _tension_and_compression(e)
     lost = mu * jnp.sum(stretch**2, axis=0) + 0.5 * lam * swelling**2
     kept = mu * jnp.sum(squeeze**2, axis=0) + 0.5 * lam * shrinking**2
-    return (), ((1 - damage) * lost + kept,)
+    damaged = (1 - damage) * lost + kept
+    return (), (jnp.where(damage >= 1, hencky_density(mu, lam, e), damaged),)
 
 
-def damaged_energy(parameters: Parameters, F: Array, damage: Array) -> Array:
-    """Stored energy per rest volume [J/m^3] at a given damage, shape (...) (Miehe et al. 2010, eq.
-    27).
+def fracture_energy(parameters: Parameters, F: Array, history: Array) -> Array:
+    """Stored energy per rest volume [J/m^3], shape (...): what damage leaves of it (Miehe et al.
+    2010, eq. 27), and of rubble, at damage 1, what sand stores.
     """
-    (_, (energy,)) = left_isotropic(_damaged_energy_value, F, (*lame(parameters), damage))
+    (_, (energy,)) = left_isotropic(_energy_value, F, (*lame(parameters), history[0]))
     return energy
 
 
@@ -113,9 +114,11 @@ FRACTURE = Law(
     history=(0.0, 0.0),
     history_names=("damage", "kept_log_volume"),
     update=_fracture_update,
-    energy=hencky_energy,
+    energy=fracture_energy,
     principal_energy=hencky_principal_energy,
     plastic=True,
+    spectral=True,
+    breaks=True,
 )
 
 

@@ -1,9 +1,9 @@
-"""The five materials of the paper, with defaults for an object about one metre wide, and what their
-parameters may be.
+"""The five materials of the paper, with defaults for an object about one metre wide: the same with
+which `default_scene` shows them.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import jax.numpy as jnp
@@ -11,57 +11,41 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
-from jaxphys.mpm.elasticity import FIXED_COROTATED
+from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
 from jaxphys.mpm.fracture import FRACTURE
 from jaxphys.mpm.law import Law
-from jaxphys.mpm.plasticity import DRUCKER_PRAGER, VON_MISES
-
-
-@dataclass(frozen=True)
-class Range:
-    """Where a parameter may lie. `text` is the range as a user reads it, `unit` its SI unit."""
-
-    text: str
-    unit: str
-    low: float
-    high: float
-    low_included: bool = False
-
-    def contains(self, values: np.ndarray) -> np.ndarray:
-        """Elementwise; what is not a number lies outside."""
-        above = values >= self.low if self.low_included else values > self.low
-        return above & (values < self.high)
-
-
-INFINITY = float("inf")
-RANGES: Mapping[str, Range] = MappingProxyType(
-    {
-        "youngs_modulus": Range("> 0", "Pa", 0, INFINITY),
-        "poisson_ratio": Range("between -1 and 0.5, both excluded", "", -1, 0.5),
-        "density": Range("> 0", "kg/m^3", 0, INFINITY),
-        "yield_stress": Range("> 0", "Pa", 0, INFINITY),
-        "hardening": Range(">= 0", "Pa", 0, INFINITY, low_included=True),
-        "friction_angle": Range("in [0, 90)", "degrees", 0, 90, low_included=True),
-        "fracture_strain": Range("> 0", "log strain", 0, INFINITY),
-        "softening_strain": Range("> 0", "log strain", 0, INFINITY),
-    }
-)
+from jaxphys.mpm.parameters import ALTERNATIVES, check_parameter
+from jaxphys.mpm.plasticity import DRUCKER_PRAGER, UNCORRECTED_DRUCKER_PRAGER, VON_MISES
 
 
 @dataclass(frozen=True)
 class Material:
-    """A law with a name a user knows, default parameters (SI, and `density`), and one line of
-    description.
+    """A law with a name a user knows.
+
+    Attributes:
+        name: what users call it.
+        law: what it does.
+        others: laws with the same parameters that it may have instead.
+        description: one line.
+        defaults: of every parameter of its laws (SI), and `density`.
     """
 
     name: str
     law: Law
-    defaults: Mapping[str, float]
+    others: tuple[Law, ...]
     description: str
+    defaults: Mapping[str, float]
+
+    @property
+    def alternatives(self) -> tuple[str, ...]:
+        """Parameters that may be given in place of one that its laws read."""
+        return tuple(key for key, other in ALTERNATIVES.items() if other.name in self.defaults)
 
 
-def _material(name: str, law: Law, description: str, **defaults: float) -> Material:
-    return Material(name, law, MappingProxyType(defaults), description)
+def _material(
+    name: str, law: Law, description: str, others: tuple[Law, ...] = (), **defaults: float
+) -> Material:
+    return Material(name, law, others, description, MappingProxyType(defaults))
 
 
 MATERIALS: Mapping[str, Material] = MappingProxyType(
@@ -71,34 +55,37 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
             _material(
                 "elastic",
                 FIXED_COROTATED,
-                "stiff rubber: springs back, hardly sags (fixed corotated)",
-                youngs_modulus=1e6,
+                "rubber: springs back, hardly sags (fixed corotated)",
+                others=(NEO_HOOKEAN, HENCKY),
+                youngs_modulus=2e5,
                 poisson_ratio=0.3,
-                density=1000.0,
+                density=400.0,
             ),
             _material(
                 "jelly",
                 FIXED_COROTATED,
-                "soft and nearly incompressible: wobbles under its own weight (fixed corotated)",
-                youngs_modulus=5e4,
+                "soft and hardly compressible: squashes and wobbles (fixed corotated)",
+                others=(NEO_HOOKEAN, HENCKY),
+                youngs_modulus=1.5e4,
                 poisson_ratio=0.4,
-                density=1000.0,
+                density=300.0,
             ),
             _material(
                 "metal",
                 VON_MISES,
                 "springs back up to its yield stress, keeps the dent beyond it (Hencky, von Mises)",
-                youngs_modulus=5e6,
+                youngs_modulus=1e6,
                 poisson_ratio=0.3,
-                density=2000.0,
-                yield_stress=5e4,
+                density=1000.0,
+                yield_stress=4.3e4,
                 hardening=0.0,
             ),
             _material(
                 "sand",
                 DRUCKER_PRAGER,
                 "dry grains: resist only while pressed together (Hencky, Drucker-Prager)",
-                youngs_modulus=1e6,
+                others=(UNCORRECTED_DRUCKER_PRAGER,),
+                youngs_modulus=5e5,
                 poisson_ratio=0.3,
                 density=1600.0,
                 friction_angle=35.0,
@@ -107,10 +94,10 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
                 "fracture",
                 FRACTURE,
                 "elastic until stretched too far, then breaks into pieces (Hencky, damage)",
-                youngs_modulus=1e6,
+                youngs_modulus=8e5,
                 poisson_ratio=0.2,
-                density=1000.0,
-                fracture_strain=0.05,
+                density=500.0,
+                fracture_strain=0.08,
                 softening_strain=0.1,
                 friction_angle=30.0,
             ),
@@ -119,51 +106,54 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(
 )
 
 
-def get_material(name: str) -> Material:
-    """The material called `name`.
+def get_material(name: str, law: str | None = None) -> Material:
+    """The material called `name`, with the law called `law` in place of its own if there is one.
 
     Raises:
-        InputError: there is none; the message gives the nearest name.
+        InputError: there is no such material, or it cannot have this law; the message gives the
+            nearest name.
     """
     if name not in MATERIALS:
         raise InputError(f"unknown material {name!r}; {nearest(name, MATERIALS)}")
-    return MATERIALS[name]
+    material = MATERIALS[name]
+    if law is None:
+        return material
+    laws = {one.name: one for one in (material.law, *material.others)}
+    if law not in laws:
+        raise InputError(f"{name} cannot have the law {law!r}; {nearest(law, laws)}")
+    return replace(material, law=laws[law])
 
 
-def check_parameter(name: str, value, where: str) -> None:
-    """Refuses a value, a number or an array, any entry of which lies outside the range of the
-    parameter `name`.
+def overridden(material: Material, overrides: Mapping | None) -> dict:
+    """What differs from the material's defaults, under the names that its law reads, checked:
+    numbers or (N,) arrays.
 
     Raises:
-        InputError: with `where`, the worst entry, and the range.
+        InputError: a parameter that this material does not have (with the nearest that it has), one
+            that is given twice under two names, or a value out of range.
     """
-    values = np.asarray(value, dtype=np.float64).reshape(-1)
-    allowed = RANGES[name]
-    wrong = np.flatnonzero(~allowed.contains(values))
-    if wrong.size:
-        entry = f"[{wrong[0]}]" if values.size > 1 else ""
-        unit = f" {allowed.unit}" if allowed.unit else ""
-        raise InputError(
-            f"{where}: {name}{entry} is {values[wrong[0]]:g}{unit}, must be {allowed.text}"
-        )
+    found, names = {}, {*material.defaults, *material.alternatives}
+    for given, value in (overrides or {}).items():
+        if given not in names:
+            raise InputError(
+                f"{material.name}: unknown parameter {given!r}; {nearest(given, names)}"
+            )
+        check_parameter(given, value, material.name)
+        name = given
+        if given in ALTERNATIVES:
+            name = ALTERNATIVES[given].name
+            value = np.asarray(ALTERNATIVES[given].convert(np.asarray(value, np.float64)))
+            if name in overrides:
+                raise InputError(f"{material.name}: give {name} or {given}, not both")
+        found[name] = value
+    return found
 
 
 def material_values(material: Material, overrides: Mapping | None = None) -> dict:
-    """The material's defaults with `overrides` laid over them: numbers or (N,) arrays by parameter
-    name, checked.
-
-    Raises:
-        InputError: a parameter that this material does not have (with the nearest that it has), or
-        a value out of range.
+    """The material's defaults with `overrides` laid over them (`overridden`): numbers or (N,)
+    arrays by the names that its law reads.
     """
-    overrides = dict(overrides or {})
-    for name, value in overrides.items():
-        if name not in material.defaults:
-            raise InputError(
-                f"{material.name}: unknown parameter {name!r}; {nearest(name, material.defaults)}"
-            )
-        check_parameter(name, value, material.name)
-    return {**material.defaults, **overrides}
+    return {**material.defaults, **overridden(material, overrides)}
 
 
 def assemble_parameters(
@@ -181,18 +171,20 @@ def assemble_parameters(
             not read it.
         density: (N,) [kg/m^3].
         segments: (law, start, stop) of contiguous particles; neighbours that share a law are one
-            segment.
+            segment. A parameter that is zero everywhere in a part may have turned its law into a
+            simpler one (`Law.reduced`), which does not read it.
 
     Raises:
         InputError: an array of values whose length is not its part's number of particles.
     """
     total = sum(count for _, _, count in parts)
-    names = sorted({name for material, _, _ in parts for name in material.law.parameters})
+    laws = [material.law.reduced(values) for material, values, _ in parts]
+    names = sorted({name for law in laws for name in law.parameters})
     columns = {name: np.zeros(total) for name in (*names, "density")}
     segments: list[tuple[Law, int, int]] = []
     start = 0
-    for material, values, count in parts:
-        for name in (*material.law.parameters, "density"):
+    for law, (material, values, count) in zip(laws, parts, strict=True):
+        for name in (*law.parameters, "density"):
             value = np.asarray(values[name], dtype=np.float64)
             if value.shape not in ((), (count,)):
                 raise InputError(
@@ -200,10 +192,10 @@ def assemble_parameters(
                     f"need one number or ({count},)"
                 )
             columns[name][start : start + count] = value
-        if segments and segments[-1][0] is material.law:
-            segments[-1] = (material.law, segments[-1][1], start + count)
+        if segments and segments[-1][0] is law:
+            segments[-1] = (law, segments[-1][1], start + count)
         else:
-            segments.append((material.law, start, start + count))
+            segments.append((law, start, start + count))
         start += count
     arrays = {name: jnp.asarray(column, dtype) for name, column in columns.items()}
     density = arrays.pop("density")

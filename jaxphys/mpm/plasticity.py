@@ -1,7 +1,10 @@
-"""Plastic laws on Hencky strain: von Mises for metal, Drucker-Prager with volume correction for
-sand.
+"""Plastic laws on Hencky strain: von Mises for metal, Drucker-Prager for sand.
 
-Both return maps move the principal log strains only, so one eigen-decomposition gives the return
+Parameters mean what a handbook means: the yield stress and the hardening modulus of a uniaxial
+test, the friction angle of triaxial compression. The return maps know the radius of von Mises'
+cylinder and the slope of Drucker and Prager's cone.
+
+All return maps move the principal log strains only, so one eigen-decomposition gives the return
 map and the stress. The elastic gradient is updated as F + (Q diag(exp(change) - 1) Q^T) F: where
 nothing yields the change is zero and F stays bit for bit what it was.
 """
@@ -12,6 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.core import algebra
+from jaxphys.core.errors import InputError, nearest
 from jaxphys.core.spectral import left_isotropic
 from jaxphys.mpm.elasticity import (
     ELASTIC_PARAMETERS,
@@ -19,8 +23,13 @@ from jaxphys.mpm.elasticity import (
     hencky_principal_energy,
     hencky_principal_stress,
     lame,
+    without_memory,
 )
 from jaxphys.mpm.law import Law, Parameters
+
+# sqrt(3/2) |dev tau| is the stress of a uniaxial test, sqrt(2/3) |plastic strain| its plastic
+# strain.
+UNIAXIAL = math.sqrt(2 / 3)
 
 
 def split_deviator(e: Array) -> tuple[Array, Array, Array]:
@@ -50,43 +59,111 @@ def apply_change(change: Array, F: Array) -> Array:
 def von_mises_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple[Array]]:
     """The von Mises return map in principal log strains (3, ...), for `left_isotropic`.
 
-    Yield where |dev tau| = 2 mu |dev e| exceeds tau_Y + H a, with a the accumulated plastic strain.
-    The closest point lies along the deviator, at a distance g with 2 mu (|dev e| - g) = tau_Y + H
-    (a + g) (Simo and Hughes 1998, box 3.1).
+    Yield where |dev tau| = 2 mu |dev e| exceeds the radius of the cylinder, which grows by `growth`
+    for each unit of plastic strain. The closest point lies along the deviator, at a distance g with
+    2 mu (|dev e| - g) = radius + growth g (Simo and Hughes 1998, box 3.1).
 
     Args:
         e: trial log strains.
-        arguments: mu, lambda, tau_Y, H [Pa], and a, each (...).
+        arguments: mu, lambda, radius, growth [Pa], each (...).
 
     Returns:
-        (exp(change) - 1, principal Kirchhoff stress [Pa]), (the new accumulated plastic strain,).
+        (exp(change) - 1, principal Kirchhoff stress [Pa]), (g,).
     """
-    mu, lam, yield_stress, hardening, accumulated = arguments
+    mu, lam, radius, growth = arguments
+    values, flow = _onto_cylinder(e, mu, lam, radius, 2 * mu + growth)
+    return values, (flow,)
+
+
+def perfect_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple]:
+    """`von_mises_values` of a cylinder that does not grow: mu, lambda, radius."""
+    mu, lam, radius = arguments
+    values, _ = _onto_cylinder(e, mu, lam, radius, 2 * mu)
+    return values, ()
+
+
+def _onto_cylinder(e: Array, mu: Array, lam: Array, radius: Array, resistance: Array):
     _, deviator, norm = split_deviator(e)
-    excess = 2 * mu * norm - (yield_stress + hardening * accumulated)
-    flow = jnp.where(excess > 0, excess / (2 * mu + hardening), 0)
+    excess = 2 * mu * norm - radius
+    flow = jnp.where(excess > 0, excess / resistance, 0)
     change = -flow * _unit(deviator, norm)
-    stress = hencky_principal_stress(mu, lam, e + change)
-    return (jnp.expm1(change), stress), (accumulated + flow,)
+    return (jnp.expm1(change), hencky_principal_stress(mu, lam, e + change)), flow
 
 
 def _von_mises_update(parameters: Parameters, F_trial: Array, history: Array):
-    arguments = (
-        *lame(parameters),
-        parameters["yield_stress"],
-        parameters["hardening"],
-        history[0],
-    )
-    (change, stress), (accumulated,) = left_isotropic(von_mises_values, F_trial, arguments)
-    return apply_change(change, F_trial), stress, accumulated[None]
+    plastic_strain, hardening = history[0], parameters["hardening"]
+    strength = parameters["yield_stress"] + hardening * plastic_strain
+    arguments = (*lame(parameters), UNIAXIAL * strength, UNIAXIAL**2 * hardening)
+    (change, stress), (flow,) = left_isotropic(von_mises_values, F_trial, arguments)
+    return apply_change(change, F_trial), stress, (plastic_strain + UNIAXIAL * flow)[None]
 
 
-def friction_coefficient(friction_angle: Array) -> Array:
-    """alpha = sqrt(2/3) 2 sin(phi) / (3 - sin(phi)) of the friction angle phi [degrees] (Klar et
-    al. 2016).
-    """
-    sine = jnp.sin(friction_angle * (math.pi / 180))
+def _perfect_update(parameters: Parameters, F_trial: Array, history: Array):
+    arguments = (*lame(parameters), UNIAXIAL * parameters["yield_stress"])
+    (change, stress), _ = left_isotropic(perfect_values, F_trial, arguments)
+    return apply_change(change, F_trial), stress, history
+
+
+def _triaxial_coefficient(sine: Array) -> Array:
     return math.sqrt(2 / 3) * 2 * sine / (3 - sine)
+
+
+def _plane_strain_coefficient(sine: Array) -> Array:
+    return math.sqrt(2) / 3 * sine
+
+
+COEFFICIENTS = {
+    "triaxial compression": _triaxial_coefficient,
+    "plane strain": _plane_strain_coefficient,
+}
+
+
+def friction_coefficient(friction_angle: Array, test: str = "triaxial compression") -> Array:
+    """The slope alpha of the cone |dev tau| = -alpha tr(tau) that slides where Mohr and Coulomb's
+    law with the friction angle phi does in one test.
+
+    Mohr and Coulomb's surface has corners, so no cone fits it in every test. In triaxial
+    compression alpha = sqrt(2/3) 2 sin(phi) / (3 - sin(phi)) (Klar et al. 2016). In plane strain,
+    where flow at constant volume, as here, makes the middle stress the mean of the other two,
+    alpha = sqrt(2) sin(phi) / 3: the cone of a triaxial angle of 30 degrees slides at 43.9 there.
+
+    Args:
+        friction_angle: phi [degrees], any shape.
+        test: "triaxial compression" or "plane strain".
+
+    Raises:
+        InputError: another test.
+    """
+    if test not in COEFFICIENTS:
+        raise InputError(f"friction_coefficient: no test {test!r}; {nearest(test, COEFFICIENTS)}")
+    return COEFFICIENTS[test](jnp.sin(friction_angle * (math.pi / 180)))
+
+
+def triaxial_friction_angle(plane_strain_angle: Array) -> Array:
+    """The `friction_angle` [degrees] of the cone that slides at `plane_strain_angle` [degrees] in
+    plane strain: what a parameter `plane_strain_friction_angle` stands for.
+    """
+    ratio = friction_coefficient(plane_strain_angle, "plane strain") / math.sqrt(2 / 3)
+    return jnp.arcsin(3 * ratio / (2 + ratio)) * (180 / math.pi)
+
+
+def _cone(total: Array, deviator: Array, norm: Array, mu: Array, lam: Array, alpha: Array):
+    """Whether nothing holds, and the change of log strains that slides back onto the cone."""
+    excess = norm + (3 * lam + 2 * mu) / (2 * mu) * total * alpha
+    return total > 0, -jnp.where(excess > 0, excess, 0) * _unit(deviator, norm)
+
+
+def uncorrected_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple]:
+    """The Drucker-Prager return map of Klar et al. (2016): mu, lambda, alpha.
+
+    As `drucker_prager_values` without memory: sand that has come apart resists as soon as its
+    strain turns, so it stays looser, and gains volume in every cycle.
+    """
+    mu, lam, alpha = arguments
+    apart, slide = _cone(*split_deviator(e), mu, lam, alpha)
+    change = jnp.where(apart, -e, slide)
+    stress = jnp.where(apart, 0, hencky_principal_stress(mu, lam, e + change))
+    return (jnp.expm1(change), stress), ()
 
 
 def drucker_prager_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple[Array]]:
@@ -110,10 +187,8 @@ def drucker_prager_values(e: Array, arguments) -> tuple[tuple[Array, Array], tup
     mu, lam, alpha, kept_volume = arguments
     total, deviator, norm = split_deviator(e)
     total = total + kept_volume
-    apart = total > 0
-    excess = norm + (3 * lam + 2 * mu) / (2 * mu) * total * alpha
-    flow = jnp.where(excess > 0, excess, 0)
-    change = jnp.where(apart, -e, kept_volume / 3 - flow * _unit(deviator, norm))
+    apart, slide = _cone(total, deviator, norm, mu, lam, alpha)
+    change = jnp.where(apart, -e, kept_volume / 3 + slide)
     stress = jnp.where(apart, 0, hencky_principal_stress(mu, lam, e + change))
     return (jnp.expm1(change), stress), (jnp.where(apart, total, 0),)
 
@@ -128,15 +203,35 @@ def _drucker_prager_update(parameters: Parameters, F_trial: Array, history: Arra
     return apply_change(change, F_trial), stress, volume[None]
 
 
+def _uncorrected_update(parameters: Parameters, F_trial: Array, history: Array):
+    arguments = (*lame(parameters), friction_coefficient(parameters["friction_angle"]))
+    (change, stress), _ = left_isotropic(uncorrected_values, F_trial, arguments)
+    return apply_change(change, F_trial), stress, history
+
+
+PERFECT_VON_MISES = Law(
+    name="von Mises without hardening",
+    parameters=(*ELASTIC_PARAMETERS, "yield_stress"),
+    history=(),
+    history_names=(),
+    update=_perfect_update,
+    energy=without_memory(hencky_energy),
+    principal_energy=hencky_principal_energy,
+    plastic=True,
+    spectral=True,
+    omits=("hardening",),
+)
 VON_MISES = Law(
     name="von Mises",
     parameters=(*ELASTIC_PARAMETERS, "yield_stress", "hardening"),
     history=(0.0,),
-    history_names=("plastic_strain",),
+    history_names=("equivalent_plastic_strain",),
     update=_von_mises_update,
-    energy=hencky_energy,
+    energy=without_memory(hencky_energy),
     principal_energy=hencky_principal_energy,
     plastic=True,
+    spectral=True,
+    without=(("hardening", PERFECT_VON_MISES),),
 )
 DRUCKER_PRAGER = Law(
     name="Drucker-Prager",
@@ -144,7 +239,19 @@ DRUCKER_PRAGER = Law(
     history=(0.0,),
     history_names=("kept_log_volume",),
     update=_drucker_prager_update,
-    energy=hencky_energy,
+    energy=without_memory(hencky_energy),
     principal_energy=hencky_principal_energy,
     plastic=True,
+    spectral=True,
+)
+UNCORRECTED_DRUCKER_PRAGER = Law(
+    name="Drucker-Prager without volume correction",
+    parameters=(*ELASTIC_PARAMETERS, "friction_angle"),
+    history=(),
+    history_names=(),
+    update=_uncorrected_update,
+    energy=without_memory(hencky_energy),
+    principal_energy=hencky_principal_energy,
+    plastic=True,
+    spectral=True,
 )

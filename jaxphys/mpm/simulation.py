@@ -108,7 +108,13 @@ class Simulation:
         if density is not None:
             model = replace(model, mass=model.volume * self._per_particle("density", density))
         known = model.parameters
+        omitted = {name for law, _, _ in self.config.segments for name in law.omits}
         for name, value in parameters.items():
+            if name in omitted - set(known):
+                raise InputError(
+                    f"with_: {name} was built as 0, which leaves it out of the program; build the "
+                    "scene with a positive one to change it"
+                )
             if name not in known:
                 names = {*known, "velocity", "gravity", "density", "friction"}
                 raise InputError(f"with_: no material here has {name!r}; {nearest(name, names)}")

@@ -72,7 +72,7 @@ def _moment(simulation: Simulation, state: State, number: int, particles: Array 
     frame, sums = jax.device_get(_look(simulation, state, particles))
     row = {"frame": number, "time": _rounded(frame.time), "steps": int(frame.status.taken)}
     row |= {name: _rounded(np.asarray(value)) for name, value in sums.items()}
-    if any(law.name == "fracture" for law, _, _ in simulation.config.segments):
+    if any(law.breaks for law, _, _ in simulation.config.segments):
         row["pieces"] = number_of_pieces(
             np.asarray(state.position).T, 1.1 * simulation.config.grid.spacing, minimum_size=20
         )

@@ -241,7 +241,7 @@ def energy(problem: Discretisation, state: State) -> float:
     """
     ((law, _, _),) = problem.config.segments
     speed = jnp.sum(state.velocity**2, axis=0) + 0.25 * jnp.sum(state.affine**2, axis=(0, 1))
-    stored = law.energy(problem.model.parameters, state.deformation)
+    stored = law.energy(problem.model.parameters, state.deformation, state.history)
     return float(jnp.sum(0.5 * problem.model.mass * speed + problem.model.volume * stored))
 
 

@@ -14,7 +14,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.gaussians.filling import particle_volumes
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.materials import assemble_parameters, get_material, material_values
+from jaxphys.mpm.materials import assemble_parameters, get_material, material_values, overridden
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.sorting import cell_order, inverse_order
 from jaxphys.mpm.state import Config, Model, State, initial_state
@@ -68,6 +68,10 @@ def validate(scene: Scene) -> None:
             material = get_material(thing.material)
         except InputError as error:
             raise InputError(f"{where}.material: {error}") from None
+        try:
+            get_material(thing.material, thing.law)
+        except InputError as error:
+            raise InputError(f"{where}.law: {error}") from None
         for label, parameters in [
             (f"{where}.parameters", thing.parameters),
             *(
@@ -109,11 +113,12 @@ def particles_of(placed: Placed, thing: Object, grid: Grid) -> Particles:
     x, y, z = np.asarray(thing.spin, np.float64)
     gradient = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     arms = positions - np.asarray(thing.centre)
-    values = material_values(get_material(thing.material), thing.parameters)
+    material = get_material(thing.material, thing.law)
+    values = material_values(material, thing.parameters)
     for region in thing.regions:
         offset = np.abs(positions - np.asarray(region.centre))
         inside = np.all(offset < np.asarray(region.half_size), axis=1)
-        for name, value in region.parameters.items():
+        for name, value in overridden(material, region.parameters).items():
             values[name] = np.where(inside, value, values[name])
     return Particles(
         positions=positions,
@@ -138,7 +143,7 @@ def solver_parts(
     """Program, numbers and start for the solver, in the solver's order."""
     grid = solver_grid(scene)
     described = [
-        (get_material(thing.material), part.values, len(part.positions))
+        (get_material(thing.material, thing.law), part.values, len(part.positions))
         for thing, part in zip(scene.objects, parts, strict=True)
     ]
     parameters, density, segments = assemble_parameters(described, dtype)

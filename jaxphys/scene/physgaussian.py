@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from jaxphys.core.errors import InputError, nearest
+from jaxphys.mpm.plasticity import UNIAXIAL
 from jaxphys.scene.boundaries import Vector
 from jaxphys.scene.physgaussian_boundaries import read_boundary
 from jaxphys.scene.reader import Reader
@@ -68,13 +69,15 @@ def _parameters(read: Reader, material: str, notes: list[str]) -> dict[str, floa
         "density": read.number("density", 200.0),
     }
     if material == "metal":
-        parameters["yield_stress"] = read.number("yield_stress", 0.0)
+        # Theirs is the radius of the cylinder in |dev tau|, ours the stress of a uniaxial test.
+        parameters["yield_stress"] = read.number("yield_stress", 0.0) / UNIAXIAL
         notes.append(
             "metal: their stress carries an extra factor of the stretch; here it is Kirchhoff's"
         )
         if read.number("hardening", 0.0) == 1:
-            parameters["hardening"] = read.number("xi", 0.0)
-            notes.append("hardening: xi is taken as the hardening modulus [Pa]")
+            # Their radius grows by 2 mu xi for each unit of plastic strain.
+            twice_mu = parameters["youngs_modulus"] / (1 + parameters["poisson_ratio"])
+            parameters["hardening"] = twice_mu * read.number("xi", 0.0) / UNIAXIAL**2
         elif read.number("hardening", 0.0) != 0:
             notes.append("hardening: only the value 1 switches it on; left off")
     if material == "sand":

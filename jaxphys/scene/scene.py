@@ -4,6 +4,7 @@ World coordinates are the solver's: right-handed, z up, the domain is [0, size].
 in degrees.
 """
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -84,6 +85,7 @@ class Object(Checked):
         source: path of a .ply, a mesh or a directory of `generate`; null: the one named on the
             command line.
         material: a name that `jaxphys materials` lists.
+        law: one of the other laws that the material may have; null: its own.
         parameters: what differs from the material's defaults, by name.
         regions: boxes with other parameters; later ones win.
         size: longest side after rotation [m].
@@ -100,6 +102,7 @@ class Object(Checked):
 
     source: str | None = None
     material: str = "jelly"
+    law: str | None = None
     parameters: dict[str, float] = field(default_factory=dict)
     regions: tuple[Region, ...] = ()
     size: float = field(default=1.0, metadata=POSITIVE)
@@ -118,7 +121,8 @@ class Domain(Checked):
     """The box that is simulated.
 
     Attributes:
-        size: of its sides [m].
+        size: of its sides [m]; a side that is no multiple of the spacing reaches into the grid's
+            last cell.
         spacing: of the grid [m].
     """
 
@@ -141,7 +145,8 @@ class Domain(Checked):
     @property
     def shape(self) -> tuple[int, int, int]:
         """Number of grid nodes along each axis."""
-        x, y, z = (round(side / self.spacing) + 1 for side in self.size)
+        # Round-off must not add a cell to a side that is a multiple of the spacing.
+        x, y, z = (math.ceil(side / self.spacing - 1e-6) + 1 for side in self.size)
         return x, y, z
 
 

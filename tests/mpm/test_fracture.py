@@ -5,7 +5,7 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.elasticity import HENCKY, lame
-from jaxphys.mpm.fracture import FRACTURE, damage_of_strain, damaged_energy, number_of_pieces
+from jaxphys.mpm.fracture import FRACTURE, damage_of_strain, number_of_pieces
 
 VALUES = {
     "youngs_modulus": jnp.asarray(1.0),
@@ -88,14 +88,22 @@ def test_damage_rises_from_zero_to_one_without_a_jump():
     assert (steps >= 0).all() and steps.max() < 0.02
 
 
-def test_stress_is_the_derivative_of_the_damaged_energy():
-    F = jnp.asarray(np.eye(3)[:, :, None] + 0.01 * RANDOM.normal(size=(3, 3, 10)))
-    damage = jnp.linspace(0, 0.9, 10)
-    P = jax.grad(lambda F: jnp.sum(damaged_energy(VALUES, F, damage)))(F)
-    history = jnp.stack([damage, jnp.zeros(10)])
-    tau = FRACTURE.update(VALUES, F, history)[1]
+def test_stress_is_the_derivative_of_the_energy_that_damage_leaves():
+    """Sound, damaged and broken particles, the last ones pressed together and pulled apart."""
+    trial = np.eye(3)[:, :, None] + 0.01 * RANDOM.normal(size=(3, 3, 12))
+    trial[:, :, 10] -= 0.04 * np.eye(3)
+    trial[:, :, 11] += 0.04 * np.eye(3)
+    damage = np.array([*np.linspace(0, 0.9, 10), 1, 1])
+    history = jnp.stack([jnp.asarray(damage), jnp.zeros(12)])
+    F, tau, history = FRACTURE.update(VALUES, jnp.asarray(trial), history)
+    energy = FRACTURE.energy(VALUES, F, history)
+    P = jax.grad(lambda F: jnp.sum(FRACTURE.energy(VALUES, F, history)))(F)
     np.testing.assert_allclose(tau, jnp.einsum("ikn,jkn->ijn", P, F), atol=1e-14)
-    assert (damaged_energy(VALUES, F, damage) >= 0).all()
+    assert (energy[:11] > 0).all() and energy[11] == pytest.approx(0, abs=1e-30)
+    sound = HENCKY.energy(VALUES, F, jnp.zeros((0, 12)))
+    assert energy[0] == pytest.approx(float(sound[0]), rel=1e-12)
+    lost = sound[1:10] - energy[1:10]
+    assert (lost >= 0).all() and lost.max() > 0.3 * sound[1:10].max()
 
 
 def test_gradients_against_central_differences():

@@ -1,25 +1,34 @@
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.elasticity import FIXED_COROTATED
+from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
+from jaxphys.mpm.fracture import FRACTURE
 from jaxphys.mpm.materials import (
     MATERIALS,
-    RANGES,
     assemble_parameters,
-    check_parameter,
     get_material,
     material_values,
+    overridden,
 )
-from jaxphys.mpm.plasticity import DRUCKER_PRAGER
+from jaxphys.mpm.parameters import ALTERNATIVES, RANGES, check_parameter
+from jaxphys.mpm.plasticity import (
+    DRUCKER_PRAGER,
+    PERFECT_VON_MISES,
+    UNCORRECTED_DRUCKER_PRAGER,
+    VON_MISES,
+    friction_coefficient,
+)
 
 
 def test_the_five_materials_of_the_paper_with_usable_defaults():
     assert set(MATERIALS) == {"elastic", "jelly", "metal", "sand", "fracture"}
     for name, material in MATERIALS.items():
         assert get_material(name) is material and material.name == name
-        assert set(material.defaults) == {*material.law.parameters, "density"}
+        for law in (material.law, *material.others):
+            assert set(material.defaults) == {*law.parameters, "density"}
         assert material.description
         for parameter, value in material.defaults.items():
             check_parameter(parameter, value, name)
@@ -40,6 +49,7 @@ def test_the_five_materials_of_the_paper_with_usable_defaults():
         ("hardening", -1.0, 0.0, ">= 0"),
         ("friction_angle", 90.0, 89.9, r"in \[0, 90\)"),
         ("friction_angle", -0.1, 0.0, r"in \[0, 90\)"),
+        ("plane_strain_friction_angle", 90.0, 89.9, r"in \[0, 90\)"),
         ("fracture_strain", 0.0, 0.1, "> 0"),
         ("softening_strain", 0.0, 0.1, "> 0"),
     ],
@@ -57,9 +67,85 @@ def test_an_array_is_checked_entry_by_entry():
         material_values(MATERIALS["sand"], {"density": np.array([1.0, 2.0, -5.0])})
 
 
-def test_every_range_belongs_to_a_parameter():
+def test_every_range_belongs_to_a_parameter_and_says_what_it_means():
     used = {name for material in MATERIALS.values() for name in material.defaults}
-    assert used == set(RANGES)
+    assert used | set(ALTERNATIVES) == set(RANGES)
+    assert all(allowed.meaning for allowed in RANGES.values())
+
+
+def test_the_angle_of_plane_strain_stands_for_the_other_one():
+    """Of the cone itself, which is sqrt(2) sin(phi) / 3 there; see test_plasticity.py for why."""
+    for name in ("sand", "fracture"):
+        material = MATERIALS[name]
+        values = material_values(material, {"plane_strain_friction_angle": 40.0})
+        assert set(values) == set(material.defaults)
+        alpha = float(friction_coefficient(values["friction_angle"]))
+        assert alpha == pytest.approx(np.sqrt(2) / 3 * np.sin(np.radians(40.0)), rel=1e-6)
+    both = {"friction_angle": 30.0, "plane_strain_friction_angle": 40.0}
+    with pytest.raises(InputError, match="not both"):
+        material_values(MATERIALS["sand"], both)
+    with pytest.raises(InputError, match="unknown parameter"):
+        material_values(MATERIALS["metal"], {"plane_strain_friction_angle": 40.0})
+    assert overridden(MATERIALS["sand"], {"density": 7.0}) == {"density": 7.0}
+
+
+def test_a_material_may_have_another_law():
+    assert get_material("sand").law is DRUCKER_PRAGER
+    chosen = get_material("sand", "Drucker-Prager without volume correction")
+    assert chosen.law is UNCORRECTED_DRUCKER_PRAGER
+    assert chosen.defaults == MATERIALS["sand"].defaults
+    assert get_material("jelly", "neo-Hookean").law is NEO_HOOKEAN
+    with pytest.raises(InputError, match=r"jelly cannot have.*did you mean 'neo-Hookean'"):
+        get_material("jelly", "neohookean")
+
+
+def test_a_metal_without_hardening_traces_none():
+    metal = MATERIALS["metal"]
+    hard = np.array([0.0, 1e4])
+    parameters, _, segments = assemble_parameters(
+        [
+            (metal, material_values(metal), 2),
+            (metal, material_values(metal, {"hardening": hard}), 2),
+        ]
+    )
+    assert segments == ((PERFECT_VON_MISES, 0, 2), (VON_MISES, 2, 4))
+    np.testing.assert_allclose(parameters["hardening"], [0, 0, 0, 1e4])
+    parameters, _, _ = assemble_parameters([(metal, material_values(metal), 2)])
+    assert "hardening" not in parameters
+    assert PERFECT_VON_MISES.omits == ("hardening",) and not PERFECT_VON_MISES.history
+
+
+LAWS = (
+    FIXED_COROTATED,
+    NEO_HOOKEAN,
+    HENCKY,
+    VON_MISES,
+    PERFECT_VON_MISES,
+    DRUCKER_PRAGER,
+    UNCORRECTED_DRUCKER_PRAGER,
+    FRACTURE,
+)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=repr)
+def test_what_a_law_says_of_itself_is_what_its_program_holds(law):
+    values = {"hardening": 0.2}
+    for material in MATERIALS.values():
+        values |= material.defaults
+    values = {name: jnp.asarray(values[name]) for name in law.parameters}
+    F = jnp.asarray(np.exp(0.5) * np.eye(3)[:, :, None]).at[0, 1].set(0.7)
+    history = jnp.zeros((len(law.history), 1))
+    assert len(law.history_names) == len(law.history)
+    program = str(jax.make_jaxpr(law.update)(values, F, history))
+    assert law.spectral == ("left_isotropic" in program or "eigen_symmetric" in program)
+    kept, stress, _ = law.update(values, F, history)
+    assert law.plastic == bool((kept != F).any())
+    assert law.energy(values, kept, history).shape == (1,)
+    if law.breaks:
+        # Pulled far, it bears nothing, and nothing again when the strain is small.
+        _, _, history = law.update(values, F, history)
+        _, again, _ = law.update(values, jnp.asarray(1.01 * np.eye(3)[:, :, None]), history)
+        assert not stress.any() and not again.any()
 
 
 def test_unknown_names_get_the_nearest():
@@ -83,9 +169,10 @@ def test_parameters_of_several_parts():
     )
     assert segments == ((FIXED_COROTATED, 0, 5), (DRUCKER_PRAGER, 5, 6))
     assert set(parameters) == {"youngs_modulus", "poisson_ratio", "friction_angle"}
-    np.testing.assert_allclose(parameters["youngs_modulus"], [1e6, 1e6, 1, 2, 3, 1e6])
+    E = [material.defaults["youngs_modulus"] for material in (stiff, stiff, sand)]
+    np.testing.assert_allclose(parameters["youngs_modulus"], [*E[:2], 1, 2, 3, E[2]])
     np.testing.assert_allclose(parameters["friction_angle"], [0, 0, 0, 0, 0, 35])
-    np.testing.assert_allclose(density, [1000] * 5 + [7])
+    np.testing.assert_allclose(density, [400] * 2 + [300] * 3 + [7])
     assert density.dtype == jnp.float32
     with pytest.raises(InputError, match="youngs_modulus has shape"):
         assemble_parameters([(jelly, material_values(jelly, {"youngs_modulus": moduli}), 2)])

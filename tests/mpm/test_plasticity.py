@@ -3,14 +3,23 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxphys.core.errors import InputError
 from jaxphys.mpm.elasticity import lame
-from jaxphys.mpm.plasticity import DRUCKER_PRAGER, VON_MISES, friction_coefficient
+from jaxphys.mpm.plasticity import (
+    DRUCKER_PRAGER,
+    PERFECT_VON_MISES,
+    UNCORRECTED_DRUCKER_PRAGER,
+    VON_MISES,
+    friction_coefficient,
+    triaxial_friction_angle,
+)
 
 METAL = {"youngs_modulus": 1.0, "poisson_ratio": 0.3, "yield_stress": 0.05, "hardening": 0.2}
 SAND = {"youngs_modulus": 1.0, "poisson_ratio": 0.3, "friction_angle": 35.0}
 CASES = [(VON_MISES, METAL), (DRUCKER_PRAGER, SAND)]
 IDS = ["von Mises", "Drucker-Prager"]
 RANDOM = np.random.default_rng(4)
+KEPT = jnp.zeros((1, 30))  # history that the energy does not read
 
 
 def arrays(values, dtype=jnp.float64):
@@ -32,31 +41,90 @@ def samples(count=30, size=0.15):
     return np.eye(3)[:, :, None] + size * RANDOM.normal(size=(3, 3, count))
 
 
+def pulled(plastic, values):
+    """Log strains of a bar that is pulled until its plastic strain is `plastic` (Hencky strain adds
+    up), and its stress: the textbook's uniaxial test.
+    """
+    stress = values["yield_stress"] + values["hardening"] * plastic
+    nu = values["poisson_ratio"]
+    elastic = stress / values["youngs_modulus"] * np.array([1, -nu, -nu])
+    return elastic + plastic * np.array([1, -0.5, -0.5]), stress
+
+
+@pytest.mark.parametrize("plastic", [1e-6, 1e-3, 0.5])
+def test_a_bar_yields_at_the_handbooks_stress_and_hardens_with_its_modulus(plastic):
+    """In one step from rest, which is exact where all strains stay in proportion."""
+    for values in (METAL, METAL | {"hardening": 0.0}):
+        total, stress = pulled(plastic, values)
+        _, tau, strain = principal(VON_MISES, values, total)
+        np.testing.assert_allclose(tau, [stress, 0, 0], atol=1e-13)
+        assert strain == pytest.approx(plastic, rel=1e-9)
+        # From the yield point on, stress over strain has the slope E H / (E + H).
+        start, first = pulled(0.0, values)
+        E, H = values["youngs_modulus"], values["hardening"]
+        assert (tau[0] - first) / (total[0] - start[0]) == pytest.approx(E * H / (E + H), abs=1e-7)
+
+
+def test_a_bar_below_the_yield_stress_is_elastic_and_above_it_is_not():
+    start, stress = pulled(0.0, METAL)
+    for factor, yields in ((1 - 1e-9, False), (1 + 1e-9, True)):
+        _, tau, strain = principal(VON_MISES, METAL, factor * start)
+        assert (strain > 0) == yields
+        assert tau[0] == pytest.approx(stress, rel=1e-8)
+
+
+def test_a_bar_pulled_in_small_steps():
+    """Sideways strain is what keeps the sides free; the same bar as in one step."""
+    values, F, history = arrays(METAL), jnp.eye(3)[:, :, None], jnp.zeros((1, 1))
+    update, before = jax.jit(VON_MISES.update), np.zeros(3)
+    for plastic in np.linspace(0, 0.3, 31):
+        total, stress = pulled(plastic, METAL)
+        F = jnp.asarray(np.diag(np.exp(total - before)))[:, :, None] * F
+        F, tau, history = update(values, F, history)
+        before = total
+        np.testing.assert_allclose(np.diag(tau[:, :, 0]), [stress, 0, 0], atol=1e-12)
+        assert float(history[0, 0]) == pytest.approx(plastic, abs=1e-12)
+
+
+def test_metal_without_hardening_is_the_same_without_its_memory():
+    values = METAL | {"hardening": 0.0}
+    assert VON_MISES.reduced(METAL) is VON_MISES
+    assert VON_MISES.reduced(values) is PERFECT_VON_MISES
+    mixed = METAL | {"hardening": np.array([0.0, 0.1])}
+    assert VON_MISES.reduced(mixed) is VON_MISES
+    F = jnp.asarray(samples())
+    full, tau, _ = VON_MISES.update(arrays(values), F, jnp.full((1, 30), 0.3))
+    kept, same, history = PERFECT_VON_MISES.update(arrays(values), F, jnp.zeros((0, 30)))
+    np.testing.assert_allclose(kept, full, atol=1e-15)
+    np.testing.assert_allclose(same, tau, atol=1e-15)
+    assert history.shape == (0, 30)
+
+
 def test_von_mises_uniaxial_and_shear():
-    limit = METAL["yield_stress"]
+    limit, growth = METAL["yield_stress"] * np.sqrt(2 / 3), METAL["hardening"] * 2 / 3
     for strains in ([0.2, 0, 0], [0.1, -0.1, 0], [-0.2, 0.05, 0.05]):
         e = np.array(strains)
         dev = e - e.mean()
         norm = np.linalg.norm(dev)
-        flow = (2 * MU * norm - limit) / (2 * MU + METAL["hardening"])
+        flow = (2 * MU * norm - limit) / (2 * MU + growth)
         elastic, tau, plastic = principal(VON_MISES, METAL, e)
         np.testing.assert_allclose(elastic, e - flow * dev / norm, atol=1e-14)
         np.testing.assert_allclose(tau, 2 * MU * elastic + LAM * e.sum(), atol=1e-14)
-        assert plastic == pytest.approx(flow, rel=1e-12)
+        assert plastic == pytest.approx(np.sqrt(2 / 3) * flow, rel=1e-12)
         # On the hardened surface exactly, and no plastic volume.
-        assert np.linalg.norm(tau - tau.mean()) == pytest.approx(limit + 0.2 * flow, rel=1e-12)
+        assert np.linalg.norm(tau - tau.mean()) == pytest.approx(limit + growth * flow, rel=1e-12)
         assert elastic.sum() == pytest.approx(e.sum(), abs=1e-14)
 
 
 def test_von_mises_simple_shear_strength():
-    """F = I + g e_x e_y: shear stress saturates at tau_Y / sqrt(2) without hardening."""
+    """F = I + g e_x e_y: shear stress saturates at sigma_Y / sqrt(3) without hardening."""
     values = arrays(METAL | {"hardening": 0.0})
     F, history = jnp.eye(3)[:, :, None], jnp.zeros((1, 1))
     advance = jnp.eye(3).at[0, 1].set(2e-3)
     for _ in range(100):
         F = jnp.einsum("ij,jkn->ikn", advance, F)
         F, tau, history = VON_MISES.update(values, F, history)
-    assert float(tau[0, 1, 0]) == pytest.approx(METAL["yield_stress"] / np.sqrt(2), rel=1e-2)
+    assert float(tau[0, 1, 0]) == pytest.approx(METAL["yield_stress"] / np.sqrt(3), rel=1e-2)
     assert float(history[0, 0]) > 0.05
 
 
@@ -78,16 +146,17 @@ def test_return_maps_are_idempotent(law, values, dtype):
 def test_stress_is_the_derivative_of_the_energy_of_what_is_left(law, values):
     values = arrays(values)
     F, tau, _ = law.update(values, jnp.asarray(samples()), jnp.zeros((1, 30)))
-    P = jax.grad(lambda F: jnp.sum(law.energy(values, F)))(F)
+    P = jax.grad(lambda F: jnp.sum(law.energy(values, F, KEPT)))(F)
     np.testing.assert_allclose(tau, jnp.einsum("ikn,jkn->ijn", P, F), atol=1e-13)
-    assert (law.energy(values, F) >= 0).all()
+    assert (law.energy(values, F, KEPT) >= 0).all()
 
 
 @pytest.mark.parametrize(("law", "values"), CASES, ids=IDS)
 def test_plastic_flow_does_not_raise_the_energy(law, values):
     trial = jnp.asarray(samples())
     F, _, _ = law.update(arrays(values), trial, jnp.zeros((1, 30)))
-    assert (law.energy(arrays(values), F) <= law.energy(arrays(values), trial) + 1e-15).all()
+    values = arrays(values)
+    assert (law.energy(values, F, KEPT) <= law.energy(values, trial, KEPT) + 1e-15).all()
 
 
 def test_metal_below_yield_keeps_its_gradient_bit_for_bit():
@@ -97,6 +166,64 @@ def test_metal_below_yield_keeps_its_gradient_bit_for_bit():
     )
     np.testing.assert_array_equal(kept, F)
     np.testing.assert_array_equal(history, 0)
+
+
+def sheared(angle, test):
+    """Principal stresses of sand under pressure, sheared at constant volume until they are steady:
+    along a bar for "triaxial compression", in a plane for "plane strain".
+    """
+    direction = {"triaxial compression": [-1, 0.5, 0.5], "plane strain": [-1, 1, 0]}[test]
+    values = SAND | {"friction_angle": angle}
+    e = np.full(3, -0.02)
+    for _ in range(60):
+        e, tau, _ = principal(DRUCKER_PRAGER, values, e + 0.002 * np.array(direction))
+    return np.sort(tau)
+
+
+def mohr_coulomb(tau):
+    """The friction angle [degrees] of Mohr and Coulomb's law, from principal stresses."""
+    return np.degrees(np.arcsin((tau[0] - tau[2]) / (tau[0] + tau[2])))
+
+
+def test_the_friction_angle_is_that_of_the_test_that_it_names():
+    assert mohr_coulomb(sheared(30.0, "triaxial compression")) == pytest.approx(30.0, abs=1e-6)
+    # The same sand in plane strain, which is why the other angle has a name of its own.
+    assert mohr_coulomb(sheared(30.0, "plane strain")) == pytest.approx(43.85, abs=0.01)
+    matched = float(triaxial_friction_angle(30.0))
+    assert mohr_coulomb(sheared(matched, "plane strain")) == pytest.approx(30.0, abs=1e-6)
+
+
+def test_friction_coefficients_in_closed_form():
+    assert float(friction_coefficient(0.0)) == float(friction_coefficient(0.0, "plane strain")) == 0
+    half = 0.5  # the sine of 30 degrees
+    slope = np.sqrt(2 / 3) * 2 * half / (3 - half)
+    assert float(friction_coefficient(30.0)) == pytest.approx(slope, rel=1e-12)
+    plane = float(friction_coefficient(30.0, "plane strain"))
+    assert plane == pytest.approx(np.sqrt(2) * half / 3, rel=1e-12)
+    back = float(friction_coefficient(triaxial_friction_angle(30.0)))
+    assert back == pytest.approx(plane, rel=1e-12)
+    with pytest.raises(InputError, match="'plane strain'"):
+        friction_coefficient(30.0, "plane stress")
+
+
+def test_sand_without_volume_correction_stays_looser():
+    """Pulled apart and pressed back it resists at once; with it, only when it has closed."""
+    values = arrays(SAND)
+    F = jnp.asarray(np.exp(0.04) * np.eye(3)[:, :, None])
+    stresses = {}
+    for law in (DRUCKER_PRAGER, UNCORRECTED_DRUCKER_PRAGER):
+        opened, _, history = law.update(values, F, jnp.zeros((len(law.history), 1)))
+        _, tau, _ = law.update(values, np.exp(-0.02) * opened, history)
+        stresses[law] = float(tau[0, 0, 0])
+    assert stresses[DRUCKER_PRAGER] == 0
+    bulk = (2 * MU + 3 * LAM) * -0.02
+    assert stresses[UNCORRECTED_DRUCKER_PRAGER] == pytest.approx(bulk, rel=1e-12)
+    # Where nothing has come apart the two are the same.
+    pressed = jnp.asarray(samples() - 0.3 * np.eye(3)[:, :, None])
+    one = DRUCKER_PRAGER.update(values, pressed, jnp.zeros((1, 30)))
+    other = UNCORRECTED_DRUCKER_PRAGER.update(values, pressed, jnp.zeros((0, 30)))
+    np.testing.assert_allclose(one[0], other[0], atol=1e-14)
+    np.testing.assert_allclose(one[1], other[1], atol=1e-14)
 
 
 def test_sand_slides_on_its_cone():
@@ -188,8 +315,8 @@ def test_gradients_at_rest_are_finite(law, values, dtype):
 
 @pytest.mark.parametrize("side", [-1, 1])
 def test_one_sided_derivatives_at_the_yield_edge(side):
-    """Shear strain e = (t, -t, 0) reaches yield at t with 2 mu sqrt(2) t = tau_Y."""
-    edge = METAL["yield_stress"] / (2 * MU * np.sqrt(2))
+    """Shear strain e = (t, -t, 0) reaches yield at t with 2 mu t = sigma_Y / sqrt(3)."""
+    edge = METAL["yield_stress"] / (2 * MU * np.sqrt(3))
     values = arrays(METAL)
 
     def stress(t):
@@ -199,6 +326,6 @@ def test_one_sided_derivatives_at_the_yield_edge(side):
     t, h = edge * (1 + side * 1e-6), 1e-9
     slope = float(jax.grad(stress)(t))
     assert slope == pytest.approx(float(stress(t + h) - stress(t - h)) / (2 * h), rel=1e-5)
-    H = METAL["hardening"]
+    H = METAL["hardening"] * 2 / 3
     expected = 2 * MU if side < 0 else 2 * MU * H / (2 * MU + H)
     assert slope == pytest.approx(expected, rel=1e-4)
