@@ -1,0 +1,73 @@
+"""What an object may be made of, from JSON to the program."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from jaxphys.core.errors import InputError
+from jaxphys.gaussians.gaussians import from_points
+from jaxphys.mpm.plasticity import (
+    PERFECT_VON_MISES,
+    UNCORRECTED_DRUCKER_PRAGER,
+    VON_MISES,
+    triaxial_friction_angle,
+)
+from jaxphys.scene import Domain, Object, Region, Scene, scene_from_json, to_json
+from jaxphys.scene.build import build
+
+POINTS = np.random.default_rng(0).uniform(-1, 1, (30, 3)).astype(np.float32)
+GAUSSIANS = from_points(POINTS, np.full((30, 3), 0.5), 0.2)
+
+
+def made_of(material, **fields):
+    thing = Object(material=material, size=0.4, centre=(0.5, 0.5, 0.5), filling=None, **fields)
+    scene = Scene(objects=(thing,), domain=Domain((1.0, 1.0, 1.0), 1 / 12), frame_time=0.01)
+    return scene_from_json(to_json(scene))
+
+
+def test_sand_without_volume_correction():
+    scene = made_of("sand", law="Drucker-Prager without volume correction")
+    simulation = build(scene, GAUSSIANS)
+    assert [law for law, _, _ in simulation.config.segments] == [UNCORRECTED_DRUCKER_PRAGER]
+    assert simulation.state.history is None
+
+
+def test_a_law_that_the_material_cannot_have():
+    with pytest.raises(InputError, match=r"objects\[0\].law: sand cannot have the law 'Hencky'"):
+        build(made_of("sand", law="Hencky"), GAUSSIANS)
+
+
+@pytest.mark.parametrize(("hardening", "law"), [(0.0, PERFECT_VON_MISES), (1e3, VON_MISES)])
+def test_hardening_of_zero_is_left_out(hardening, law):
+    simulation = build(made_of("metal", parameters={"hardening": hardening}), GAUSSIANS)
+    assert [one for one, _, _ in simulation.config.segments] == [law]
+    assert ("hardening" in simulation.model.parameters) == (hardening > 0)
+    assert (simulation.state.history is None) == (hardening == 0)
+
+
+def test_a_region_whose_angle_is_that_of_plane_strain():
+    region = Region((0.75, 0.5, 0.5), (0.25, 1.0, 1.0), {"plane_strain_friction_angle": 30.0})
+    simulation = build(made_of("sand", regions=(region,)), GAUSSIANS)
+    right = np.asarray(simulation.state.position)[0] > 0.5
+    matched = float(triaxial_friction_angle(30.0))
+    found = np.asarray(simulation.model.parameters["friction_angle"])
+    np.testing.assert_allclose(found, np.where(right, matched, 35.0), rtol=1e-6)
+
+
+def test_only_what_breaks_is_counted():
+    assert build(made_of("fracture"), GAUSSIANS).breaks
+    assert not build(made_of("jelly"), GAUSSIANS).breaks
+
+
+@pytest.mark.parametrize("side", [1.0, 2.5])
+@pytest.mark.parametrize("spacing", [1 / 24, 1 / 12, 0.1, 0.05])
+def test_a_grid_covers_a_domain_of_whole_cells_exactly(side, spacing):
+    shape = Domain((side,) * 3, spacing).shape
+    assert (shape[0] - 1) * spacing == pytest.approx(side, rel=1e-12)
+
+
+def test_a_grid_covers_a_domain_that_is_no_multiple_of_the_spacing():
+    domain = Domain((1.0, 1.04, 1.06), 0.1)
+    assert domain.shape == (11, 12, 12)
+    assert dataclasses.replace(domain, spacing=0.08).shape == (14, 14, 15)
