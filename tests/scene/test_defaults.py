@@ -1,9 +1,18 @@
+import dataclasses
+from functools import partial
+
+import jax
+import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.materials import MATERIALS, get_material, material_values
+from jaxphys.mpm.fracture import number_of_pieces
+from jaxphys.mpm.materials import MATERIALS
+from jaxphys.mpm.rollout import check, rollout
 from jaxphys.scene import scene_from_json, to_json
+from jaxphys.scene.build import build
 from jaxphys.scene.defaults import default_scene
+from jaxphys.scene.plan import ball
 
 
 @pytest.mark.parametrize("name", MATERIALS)
@@ -12,7 +21,8 @@ def test_every_material_has_a_scene_that_is_valid(name):
     assert scene_from_json(to_json(scene)) == scene
     thing = scene.objects[0]
     assert thing.material == name
-    material_values(get_material(name), thing.parameters)
+    # The scene shows what the material's name means anywhere else.
+    assert thing.parameters == {}
     low, high = thing.centre[2] - thing.size / 2, thing.centre[2] + thing.size / 2
     assert scene.ground.height < low and high < scene.domain.size[2] - 4 * scene.domain.spacing
 
@@ -22,5 +32,78 @@ def test_unknown_material():
         default_scene("snad")
 
 
-def test_spacing_is_taken():
-    assert default_scene("jelly", spacing=0.1).domain.spacing == 0.1
+@pytest.mark.parametrize("name", MATERIALS)
+def test_a_finer_grid_shows_the_same_scene(name):
+    scene = default_scene(name)
+    for spacing in (0.12, 0.1, 0.08, 0.053):
+        other = default_scene(name, spacing=spacing)
+        assert other.domain.spacing == spacing
+        domain = dataclasses.replace(other.domain, spacing=scene.domain.spacing)
+        assert dataclasses.replace(other, domain=domain) == scene
+
+
+@partial(jax.jit, static_argnames=("config", "steps"))
+def run(config, model, state, dt, steps):
+    return rollout(config, model, state, dt=dt, steps=steps)
+
+
+def after(name, frames, spacing=0.1):
+    """Positions (N, 3) of a ball's particles in the material's scene, at the start and after some
+    frames, and the fastest speed then.
+    """
+    simulation = build(default_scene(name, spacing=spacing), ball(600))
+    end = run(
+        simulation.config,
+        simulation.model,
+        simulation.state,
+        simulation.dt,
+        frames * simulation.steps,
+    )
+    check(end.status)
+    speed = np.linalg.norm(np.asarray(end.velocity), axis=0)
+    return np.asarray(simulation.state.position).T, np.asarray(end.position).T, speed.max()
+
+
+def out_of_shape(before, now):
+    """Root mean square distance of points from where the best rigid motion would take them, over
+    that from their middle (Kabsch 1976).
+    """
+    before, now = before - before.mean(0), now - now.mean(0)
+    U, _, Vt = np.linalg.svd(before.T @ now)
+    U[:, 2] *= np.linalg.det(U @ Vt)
+    return np.sqrt(np.mean((before @ (U @ Vt) - now) ** 2) / np.mean(before**2))
+
+
+def test_elastic_bounces_and_keeps_its_shape():
+    before, now, _ = after("elastic", 13)
+    assert out_of_shape(before, now) < 0.05
+    assert now[:, 2].min() > 0.4 + 0.1  # in the air again
+
+
+def test_metal_keeps_its_dent():
+    before, now, speed = after("metal", 24)
+    assert out_of_shape(before, now) > 0.05
+    assert speed < 0.3
+
+
+def test_jelly_wobbles_and_comes_to_rest():
+    before, now, speed = after("jelly", 6)
+    assert out_of_shape(before, now) > 0.1
+    before, now, speed = after("jelly", 72)
+    assert speed < 0.2
+    assert np.ptp(now[:, 2]) < np.ptp(before[:, 2])  # it sags
+
+
+def test_sand_runs_into_a_heap():
+    before, now, speed = after("sand", 22)
+    assert np.ptp(now[:, 2]) < 0.6 * np.ptp(before[:, 2])
+    assert np.ptp(now[:, 0]) > 1.5 * np.ptp(before[:, 0])
+    assert speed < 0.2
+
+
+def test_what_fractures_breaks_into_pieces():
+    """On the coarsest grid whose cells are no wider than the flaws: others part nowhere."""
+    spacing = 1 / 16
+    before, now, _ = after("fracture", 12, spacing)
+    pieces = partial(number_of_pieces, radius=1.1 * spacing, minimum_size=len(before) // 50)
+    assert pieces(before) == 1 and pieces(now) >= 3
