@@ -51,7 +51,7 @@ def after(name, frames, spacing=0.1):
     """Positions (N, 3) of a ball's particles in the material's scene, at the start and after some
     frames, and the fastest speed then.
     """
-    simulation = build(default_scene(name, spacing=spacing), ball(600))
+    simulation, _ = build(default_scene(name, spacing=spacing), ball(600))
     end = run(
         simulation.config,
         simulation.model,

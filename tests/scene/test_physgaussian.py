@@ -160,3 +160,18 @@ def test_file_is_recognised(tmp_path):
     (tmp_path / "ficus.json").write_text(json.dumps(FICUS))
     loaded = read_scene(tmp_path / "ficus.json")
     assert loaded.notes and loaded.scene.frames == 125
+
+
+def test_their_yield_stress_is_a_radius_and_their_hardening_grows_it():
+    """Theirs yields at |dev tau| = yield_stress, which then grows by 2 mu xi times the plastic
+    strain; ours take the stress of a uniaxial test, sqrt(3/2) |dev tau|, and its plastic strain,
+    sqrt(2/3) times that.
+    """
+    theirs = {"material": "metal", "g": [0, 0, 0], "E": 1e5, "nu": 0.25}
+    theirs |= {"yield_stress": 1e3, "hardening": 1, "xi": 0.1}
+    ours = from_physgaussian(theirs).scene.objects[0].parameters
+    assert ours["yield_stress"] == pytest.approx(1e3 * 1.5**0.5)
+    growth = 2 * (1e5 / 2.5) * 0.1
+    assert ours["hardening"] == pytest.approx(growth * 1.5)
+    soft = from_physgaussian(theirs | {"hardening": 0}).scene.objects[0].parameters
+    assert "hardening" not in soft
