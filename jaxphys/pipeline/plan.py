@@ -156,12 +156,14 @@ def _facts(scene: Scene, built: Built) -> tuple[dict[str, str], dict[str, str]]:
     """Parts in and parts left out, each with the reason."""
     found = program_parts(scene, built)
     included, left_out = {}, {}
-    laws = {f"law {material.law.name}" for material in MATERIALS.values()}
-    for name in sorted(laws | {name for name in found if name.startswith("law ")}):
-        if name in found:
-            included[name] = "an object is made of it"
-        else:
-            left_out[name] = "no object is made of it"
+    running = {law for law, _, _ in built.simulation.config.segments}
+    for name in sorted(name for name in found if name.startswith("law ")):
+        included[name] = "an object is made of it"
+    for law in dict.fromkeys(material.law for material in MATERIALS.values()):
+        if running.isdisjoint({law, *(simpler for _, simpler in law.without)}):
+            left_out[f"law {law.name}"] = "no object is made of it"
+    for name in sorted({name for law in running for name in law.omits}):
+        left_out[name] = "is zero"
     for name in sorted(name for name in found if name.startswith("boundary ")):
         included[name] = "the scene lists it"
     if not any(name.startswith("boundary ") for name in found):
