@@ -16,6 +16,7 @@ from jax import Array
 
 from jaxphys.core import algebra
 from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.program import part
 from jaxphys.core.spectral import left_isotropic
 from jaxphys.mpm.elasticity import (
     ELASTIC_PARAMETERS,
@@ -53,7 +54,8 @@ def apply_change(change: Array, F: Array) -> Array:
     """F after a change of its log stretches, `change` being Q diag(exp(change) - 1) Q^T, (3, 3,
     ...).
     """
-    return F + algebra.matmul(change, F)
+    with part("return map"):
+        return F + algebra.matmul(change, F)
 
 
 def von_mises_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple[Array]]:
