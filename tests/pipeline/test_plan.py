@@ -130,3 +130,14 @@ def test_the_command_says_the_same(tmp_path, capsys):
     assert np.isclose(said["substep"], expected.substep)
     text = as_text(expected)
     assert "law Drucker-Prager" in text and "limited by" in text
+
+
+def test_a_law_without_what_is_zero_is_told_as_such():
+    plan = make_plan(scene("metal"))
+    assert "law von Mises without hardening" in plan.included
+    assert plan.left_out["hardening"] == "is zero" and "law von Mises" not in plan.left_out
+    assert "law Drucker-Prager" in plan.left_out
+    thing = scene("metal").objects[0]
+    hard = replace(thing, parameters={"hardening": 1e4})
+    plan = make_plan(replace(scene("metal"), objects=(hard,)))
+    assert "law von Mises" in plan.included and "hardening" not in plan.left_out
