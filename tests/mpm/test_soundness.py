@@ -248,11 +248,11 @@ def swing(share, bound, steps=5000):
 
     def body(_, carry):
         state, most = carry
-        state = step(config, model, state, dt)
+        state = jax.lax.fori_loop(0, 10, lambda _, s: step(config, model, s, dt), state)
         return state, jnp.maximum(most, energy(state))
 
     first = energy(state)
-    end, most = jax.jit(lambda s: jax.lax.fori_loop(0, steps, body, (s, first)))(state)
+    end, most = jax.jit(lambda s: jax.lax.fori_loop(0, steps // 10, body, (s, first)))(state)
     return np.asarray(most / first), int(end.status.code)
 
 
