@@ -55,3 +55,19 @@ def test_the_derivative_is_that_of_the_sum_and_knows_no_residual():
     (_, residual), (slope, of_residual) = jax.jvp(add, primals, tangents)
     assert float(slope) == 9.0 and float(of_residual) == 0.0
     assert abs(float(residual) - 5e-8) < 1e-13  # 1 + 5e-8 is 1 in float32
+
+
+def test_a_million_slow_strains_grow_as_their_exponential():
+    """F <- (I + dt C) F with C = 1e-2/s: 1e-8 a step, less than a rounding of 1."""
+    rate = np.array([[1.0, 0.5, 0.0], [0.2, -1.0, 0.3], [0.0, 0.7, 0.4]])
+    change = jnp.asarray(1e-8 * rate, jnp.float32)
+
+    def body(_, carry):
+        return add(*carry, change @ carry[0])
+
+    start = jnp.eye(3, dtype=jnp.float32)
+    F, rest = jax.jit(lambda: jax.lax.fori_loop(0, 1_000_000, body, (start, 0 * start)))()
+    found = np.asarray(F, float) + np.asarray(rest, float) - np.eye(3)
+    C = 1e-2 * rate
+    expected = C + C @ C / 2 + C @ C @ C / 6 + C @ C @ C @ C / 24
+    np.testing.assert_allclose(found, expected, atol=1e-3 * np.abs(expected).max())
