@@ -2,7 +2,6 @@
 
 from .adjoint import Checkpointed as Checkpointed
 from .adjoint import Plain as Plain
-from .boundaries import GridBoundary as GridBoundary
 from .fracture import number_of_pieces as number_of_pieces
 from .frames import advance_frame as advance_frame
 from .frames import rollout_frames as rollout_frames
@@ -13,7 +12,6 @@ from .materials import Material as Material
 from .materials import get_material as get_material
 from .motion import Frame as Frame
 from .motion import Motion as Motion
-from .particle_boundaries import ParticleBoundary as ParticleBoundary
 from .rollout import SimulationError as SimulationError
 from .rollout import check as check
 from .simulation import Simulation as Simulation

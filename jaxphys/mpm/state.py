@@ -91,9 +91,8 @@ class Model:
     """What a gradient may reach and a step does not change. A pytree.
 
     mass: (N,) [kg]; volume: (N,) rest volume [m^3]; parameters: name -> (N,), as the laws name
-    them; gravity: (3,) [m/s^2], or None for none, which no step then adds; boundaries: grid and
-    particle boundaries, applied in order; rest: (3, N) [m], the positions by which particle
-    boundaries choose, None if there are none.
+    them; gravity: (3,) [m/s^2], or None for none, which no step then adds; boundaries: as
+    `boundaries.prepare` makes them.
     """
 
     mass: Array
@@ -101,7 +100,6 @@ class Model:
     parameters: dict[str, Array]
     gravity: Array | None
     boundaries: tuple = ()
-    rest: Array | None = None
 
 
 class Status(NamedTuple):
@@ -140,7 +138,8 @@ class State(NamedTuple):
     deformation: (3, 3, N), the elastic trial gradient; total: (3, 3, N), the total gradient, or
     None where it is the same or not asked for; history: (H, N) or None if no law keeps any;
     time: () [s]; status: `Status`; residual: `Residual`, or None in float64, where sums have digits
-    to spare.
+    to spare; slip: (R, N) [m], how far contact is strained along surfaces with friction, three rows
+    each, or None if there are none.
     """
 
     position: Array
@@ -152,6 +151,7 @@ class State(NamedTuple):
     time: Array
     status: Status
     residual: Residual | None = None
+    slip: Array | None = None
 
 
 def initial_state(
@@ -161,11 +161,13 @@ def initial_state(
     deformation=None,
     affine=None,
     dtype=None,
+    boundaries: tuple = (),
 ) -> State:
     """The state at time 0 from arrays in public order.
 
     position: (N, 3) [m]; velocity: (N, 3) [m/s], default 0; deformation: (N, 3, 3), default the
-    identity; affine: (N, 3, 3) [1/s], default 0; dtype: default that of `position`.
+    identity; affine: (N, 3, 3) [1/s], default 0; dtype: default that of `position`; boundaries:
+    those of the model, some of which need room in `slip`.
     Raises `InputError` if a shape is wrong, there are not as many particles as segments cover, or
     a particle is turned inside out: det F <= 0 (of traced arrays the first step's status tells).
     """
@@ -210,6 +212,7 @@ def initial_state(
             total=None if total is None else zeros(3, 3),
             time=jnp.zeros((), dtype),
         )
+    rows = sum(boundary.rows for boundary in boundaries)
     return State(
         position=last("position", position, (3,)),
         velocity=zeros(3) if velocity is None else last("velocity", velocity, (3,)),
@@ -225,6 +228,7 @@ def initial_state(
             taken=jnp.array(0, jnp.int32),
         ),
         residual=residual,
+        slip=zeros(rows) if rows else None,
     )
 
 

@@ -4,13 +4,10 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.core import algebra, compensated
-from jaxphys.core.errors import InputError
 from jaxphys.core.program import part
+from jaxphys.mpm.boundaries import stages
 
-from .boundaries import GridBoundary
-from .grid import node_coordinates
 from .kernel import base_node, inside
-from .particle_boundaries import ParticleBoundary
 from .state import (
     CODES,
     COLLAPSED,
@@ -34,10 +31,10 @@ COLLAPSE = 1e-3  # share of its volume below which a particle counts as collapse
 def step(config: Config, model: Model, state: State, dt) -> State:
     """The state one time step `dt` [s] later. Pure; holds only the parts that the scene lists.
 
-    In order: the laws (return map and stress of the trial gradient together), momentum and mass to
-    the grid, gravity and grid boundaries, velocity and its gradient back, particle boundaries,
-    x <- x + dt v, F <- (I + dt C) F. The status says what failed first; the step itself goes on
-    whatever happens, and addresses no memory outside the grid.
+    In order: the laws (return map and stress of the trial gradient together), contact, momentum and
+    mass to the grid, gravity and what boundaries do on the grid, velocity and its gradient back,
+    what they do to particles, x <- x + dt v, F <- (I + dt C) F. The status says what failed first;
+    the step itself goes on whatever happens, and addresses no memory outside the grid.
 
     In float32 the sums x, F and time carry what rounding left out (`State.residual`), without which
     steps of stiff matter are too small to move it. A law that returns another F than it was given
@@ -51,6 +48,10 @@ def step(config: Config, model: Model, state: State, dt) -> State:
     # MLS-MPM replaces grad w by w (x_i - x_p) 4 / dx^2.
     impulse = (-4.0 / grid.spacing**2) * dt * model.volume
     affine = model.mass * state.affine + impulse * stress
+    momentum = model.mass * state.velocity
+    given, slip = stages.impulses(
+        model, grid, state.position, state.velocity, state.slip, state.time, dt
+    )
     origin = window_origin(shape, grid.spacing, grid.shape, state.position)
     rows = particle_to_grid(
         shape,
@@ -59,15 +60,16 @@ def step(config: Config, model: Model, state: State, dt) -> State:
         origin,
         state.position,
         model.mass,
-        model.mass * state.velocity,
+        momentum if given is None else momentum + given,
         affine,
     )
-    rows = update_grid(config, model, rows, origin, state.time, dt)
+    rows = update_grid(model, rows, dt)
+    rows = stages.on_grid(model, grid, shape, origin, rows, state.time, dt)
     velocity, moment = grid_to_particle(
         shape, grid.spacing, grid.shape, origin, state.position, rows
     )
     C = moment * (4.0 / grid.spacing**2)
-    velocity = move_particles(model, state, velocity, dt)
+    velocity = stages.on_particles(model, state.position, velocity, state.time, dt)
     carried = state.residual or Residual(None, None, None, None)
     position, position_rest = compensated.add(state.position, carried.position, dt * velocity)
     time, time_rest = compensated.add(state.time, carried.time, dt)
@@ -88,6 +90,7 @@ def step(config: Config, model: Model, state: State, dt) -> State:
         time=time,
         status=judge(config, state, position, velocity, C, F, dt, origin),
         residual=None if state.residual is None else residual,
+        slip=slip,
     )
 
 
@@ -115,9 +118,7 @@ def _join(parts: list[Array]) -> Array:
     return parts[0] if len(parts) == 1 else jnp.concatenate(parts, axis=-1)
 
 
-def update_grid(
-    config: Config, model: Model, rows: Array, origin: Array, time: Array, dt: Array
-) -> Array:
+def update_grid(model: Model, rows: Array, dt: Array) -> Array:
     """Node velocities [m/s] from momentum and mass rows, both (M, 4); the last column is void.
 
     Nodes with next to no mass stand still: below eps^2 of the heaviest particle a node adds less
@@ -131,31 +132,7 @@ def update_grid(
         with part("gravity"):
             # All four columns at once: XLA would otherwise pad each row that a transfer reads.
             rows = rows + dt * jnp.concatenate([model.gravity, jnp.zeros_like(model.gravity[:1])])
-    rows = jnp.where(filled, rows, 0.0)
-    boundaries = [b for b in model.boundaries if isinstance(b, GridBoundary)]
-    if not boundaries:
-        return rows
-    shape = config.nodes
-    coordinates = node_coordinates(shape, config.grid.spacing, origin, rows.dtype)
-    velocity = rows.T[:3].reshape(3, *shape)
-    for boundary in boundaries:
-        velocity = boundary.apply(velocity, coordinates, time, dt)
-    return jnp.concatenate([velocity.reshape(3, -1), rows.T[3:]]).T
-
-
-def move_particles(model: Model, state: State, velocity: Array, dt: Array) -> Array:
-    """Particle velocities (3, N) [m/s] after the particle boundaries."""
-    for boundary in model.boundaries:
-        if isinstance(boundary, ParticleBoundary):
-            if model.rest is None:
-                raise InputError(
-                    f"Model.rest is None, but {type(boundary).__name__} chooses particles by it; "
-                    "set it to the initial positions (3, N)."
-                )
-            velocity = boundary.apply(
-                state.position, velocity, model.rest, model.mass, state.time, dt
-            )
-    return velocity
+    return jnp.where(filled, rows, 0.0)
 
 
 def judge(

@@ -97,7 +97,7 @@ def free_bar(
     line of nodes: the sums over the other two axes are exact, so that the problem is the
     one-dimensional one.
     """
-    return _line(bar, cells, cells, courant, periods, staggered, -1e9, room, dtype)
+    return _line(bar, cells, cells, courant, periods, staggered, -1e5, room, dtype)
 
 
 def held_bar(

@@ -9,7 +9,7 @@ scheme, second order in dt, when v is read as the velocity half a step before x.
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,7 +17,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core import algebra
-from jaxphys.mpm.boundaries import FOREVER, GridBoundary, HalfSpace
+from jaxphys.mpm.boundaries import Boundary, Plane, Setting
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.law import Law
 from jaxphys.mpm.state import Config, Model, State, initial_state
@@ -63,7 +63,7 @@ class Discretisation:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class BodyForce(GridBoundary):
+class BodyForce(Boundary):
     """Adds dt b(x, t) to the velocity of every node.
 
     Attributes:
@@ -73,12 +73,13 @@ class BodyForce(GridBoundary):
         share: what part of b to apply, (): 1, or another number in a negative control.
     """
 
+    type: ClassVar[str] = "body force"
     truth: object
     origin: Array
     spacing: Array
     share: Array
 
-    def apply(self, velocity: Array, coordinates: tuple, time: Array, dt: Array) -> Array:
+    def on_grid(self, velocity, coordinates, grid, time, dt) -> Array:
         offsets = [self.spacing * (x - self.origin[axis]) for axis, x in enumerate(coordinates)]
         x = jnp.stack(jnp.broadcast_arrays(*offsets))
         b = self.truth.body_acceleration(x, time) / self.spacing
@@ -87,27 +88,20 @@ class BodyForce(GridBoundary):
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Planar(GridBoundary):
+class Planar(Boundary):
     """Keeps the motion in the plane normal to an axis (plane strain)."""
 
+    type: ClassVar[str] = "plane strain"
     axis: int = field(metadata={"static": True})
 
-    def apply(self, velocity: Array, coordinates: tuple, time: Array, dt: Array) -> Array:
+    def on_grid(self, velocity, coordinates, grid, time, dt) -> Array:
         return velocity.at[self.axis].set(0.0)
 
 
-def held_up_to(coordinate: float, dtype) -> HalfSpace:
+def held_up_to(coordinate: float, dtype) -> Plane:
     """Holds all nodes with x up to `coordinate` [dx]; a large negative one holds none."""
-    zero = jnp.zeros(3, dtype)
-    return HalfSpace(
-        point=zero.at[0].set(coordinate + 0.25),
-        normal=zero.at[0].set(1.0),
-        friction=jnp.zeros((), dtype),
-        velocity=zero,
-        start=jnp.zeros((), dtype),
-        end=jnp.asarray(FOREVER, dtype),
-        surface="sticky",
-    )
+    setting = Setting(Grid((3, 3, 3), 1.0), np.zeros((0, 3)), np.zeros(0), dtype)
+    return Plane((coordinate + 0.25, 0.0, 0.0), (1.0, 0.0, 0.0), "sticky").prepared(setting)
 
 
 def steps_for(duration: float, courant: float, spacing: float, speed: float) -> tuple[float, int]:

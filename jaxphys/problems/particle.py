@@ -85,7 +85,7 @@ def breathing(
         dt=dt,
         steps=steps,
         scale=particle.spacing,
-        boundaries=(held_up_to(-1e9, dtype),),
+        boundaries=(held_up_to(-1e5, dtype),),
         staggered=staggered,
         room=room,
         dtype=dtype,

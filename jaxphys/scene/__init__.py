@@ -2,14 +2,16 @@
 the plan.
 """
 
-from .boundaries import Box as Box
-from .boundaries import Cut as Cut
-from .boundaries import Impulse as Impulse
-from .boundaries import Plane as Plane
-from .boundaries import Release as Release
-from .boundaries import Rotate as Rotate
-from .boundaries import Translate as Translate
-from .boundaries import Walls as Walls
+from jaxphys.mpm.boundaries import Box as Box
+from jaxphys.mpm.boundaries import Cut as Cut
+from jaxphys.mpm.boundaries import Damping as Damping
+from jaxphys.mpm.boundaries import Impulse as Impulse
+from jaxphys.mpm.boundaries import Plane as Plane
+from jaxphys.mpm.boundaries import Release as Release
+from jaxphys.mpm.boundaries import Rotate as Rotate
+from jaxphys.mpm.boundaries import Translate as Translate
+from jaxphys.mpm.boundaries import Walls as Walls
+
 from .json import read_json as read_json
 from .json import scene_from_json as scene_from_json
 from .json import to_json as to_json

@@ -13,6 +13,7 @@ import numpy as np
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.filling import particle_volumes
 from jaxphys.gaussians.gaussians import Gaussians
+from jaxphys.mpm.boundaries import Damping, Setting, prepare
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.materials import assemble_parameters, get_material, material_values, overridden
 from jaxphys.mpm.simulation import Simulation
@@ -22,7 +23,6 @@ from jaxphys.mpm.substep import choose_substep
 from jaxphys.scene.look import Look, look_of
 from jaxphys.scene.place import Placed, place
 from jaxphys.scene.scene import Object, Scene
-from jaxphys.scene.solver_boundaries import solver_boundaries
 
 
 class Built(NamedTuple):
@@ -157,15 +157,19 @@ def solver_parts(
     def gathered(name: str) -> np.ndarray:
         return np.concatenate([getattr(part, name) for part in parts])[arrangement]
 
-    positions = gathered("positions")
+    positions, volumes = gathered("positions"), gathered("volumes")
+    setting = Setting(grid, positions, volumes, dtype)
+    boundaries = prepare(scene.boundaries, setting)
+    if scene.damping > 0:
+        boundaries = (*boundaries, Damping(scene.damping).prepared(setting))
     state = initial_state(
         config,
         jnp.asarray(positions, dtype),
         velocity=gathered("velocities"),
         affine=gathered("velocity_gradients"),
+        boundaries=boundaries,
     )
-    volume = jnp.asarray(gathered("volumes"), dtype)
-    boundaries, rest = solver_boundaries(scene, grid, positions)
+    volume = jnp.asarray(volumes, dtype)
     model = Model(
         mass=density[arrangement] * volume,
         volume=volume,
@@ -173,7 +177,6 @@ def solver_parts(
         # Gravity of zero is left out of the program.
         gravity=jnp.asarray(scene.gravity, dtype) if any(scene.gravity) else None,
         boundaries=boundaries,
-        rest=jnp.asarray(positions.T, dtype) if rest else None,
     )
     return config, model, state
 

@@ -7,8 +7,8 @@ that a second of motion takes some hundred steps on the coarse grid.
 
 from collections.abc import Callable
 
+from jaxphys.mpm.boundaries import Plane, Vector, Walls
 from jaxphys.mpm.materials import get_material
-from jaxphys.scene.boundaries import Plane, Vector, Walls
 from jaxphys.scene.scene import Domain, Filling, Ground, Object, Region, Rotation, Scene
 
 SIDE = 2.5

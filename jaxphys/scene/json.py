@@ -20,15 +20,18 @@ def to_json(value: Any) -> Any:
     `type`.
     """
     if dataclasses.is_dataclass(value):
-        fields = {
-            entry.name: to_json(getattr(value, entry.name)) for entry in dataclasses.fields(value)
-        }
+        fields = {entry.name: to_json(getattr(value, entry.name)) for entry in _declared(value)}
         return {"type": value.type} | fields if hasattr(value, "type") else fields
     if isinstance(value, tuple):
         return [to_json(part) for part in value]
     if isinstance(value, dict):
         return {key: to_json(part) for key, part in value.items()}
     return value
+
+
+def _declared(cls: Any) -> list[dataclasses.Field]:
+    """The fields of a dataclass that a file has a name for."""
+    return [entry for entry in dataclasses.fields(cls) if entry.metadata.get("keys") != ()]
 
 
 def _fail(where: str, expected: str, value: Any) -> typing.NoReturn:
@@ -40,7 +43,7 @@ def _fail(where: str, expected: str, value: Any) -> typing.NoReturn:
 def _read_class(cls: type, value: Any, where: str) -> Any:
     if not isinstance(value, dict):
         _fail(where, "an object { ... }", value)
-    entries = {entry.name: entry for entry in dataclasses.fields(cls)}
+    entries = {entry.name: entry for entry in _declared(cls)}
     known = set(entries) | ({"type"} if hasattr(cls, "type") else set())
     for key in value:
         if key not in known:

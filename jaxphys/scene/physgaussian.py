@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from jaxphys.core.errors import InputError, nearest
+from jaxphys.mpm.boundaries import Vector
 from jaxphys.mpm.plasticity import UNIAXIAL
-from jaxphys.scene.boundaries import Vector
 from jaxphys.scene.physgaussian_boundaries import read_boundary
 from jaxphys.scene.reader import Reader
 from jaxphys.scene.scene import Domain, Filling, Object, Region, Rotation, Scene, View
@@ -206,7 +206,9 @@ def from_physgaussian(value: Any, where: str = "config") -> Imported:
     if side <= 0 or cells < 1:
         raise InputError(f"{where}.n_grid, grid_lim: {cells} and {side} must be above 0")
     try:
-        domain = Domain(size=(side, side, side), spacing=side / cells)
+        # As many nodes as theirs, so that their walls, counted in nodes from the ends, are ours.
+        span = side - side / cells
+        domain = Domain(size=(span, span, span), spacing=side / cells)
         substep, frame_time = read.number("substep_dt", 1e-4), read.number("frame_dt", 1e-2)
         if not 0 < substep <= frame_time:
             raise InputError(

@@ -3,9 +3,9 @@
 from typing import Any
 
 from jaxphys.core.errors import InputError, nearest
-from jaxphys.scene.boundaries import (
+from jaxphys.mpm.boundaries import (
     FOREVER,
-    Boundary,
+    AnyBoundary,
     Box,
     Cut,
     Impulse,
@@ -84,7 +84,7 @@ def _plane(read: Reader, substep: float, notes: list[str]) -> Plane | Cut:
     if surface != "sticky":
         notes.append(f"surface_collider {surface}: theirs sticks whatever it says; not so here")
     kind = surface if surface in ("sticky", "slip") else "separate"
-    return Plane(point, normal, kind, friction, start, end)
+    return Plane(point, normal, kind, friction, start, end, acts_on="nodes")
 
 
 def _release(read: Reader, substep: float, notes: list[str]) -> Release:
@@ -106,7 +106,8 @@ def _rotate(read: Reader, substep: float, notes: list[str]) -> Rotate:
         read.numbers("normal", 3),
         half_height,
         radius,
-        read.number("rotation_scale"),
+        # By the left hand: theirs is v = -scale n x r.
+        -read.number("rotation_scale"),
         read.number("translation_scale"),
         read.number("start_time"),
         read.number("end_time"),
@@ -114,7 +115,7 @@ def _rotate(read: Reader, substep: float, notes: list[str]) -> Rotate:
 
 
 def _walls(read: Reader, substep: float, notes: list[str]) -> Walls:
-    return Walls()
+    return Walls(acts_on="nodes")
 
 
 READERS = {
@@ -128,7 +129,7 @@ READERS = {
 }
 
 
-def read_boundary(value: Any, where: str, substep: float, notes: list[str]) -> Boundary:
+def read_boundary(value: Any, where: str, substep: float, notes: list[str]) -> AnyBoundary:
     """One entry of `boundary_conditions`; adds to `notes` what differs from PhysGaussian."""
     if not isinstance(value, dict) or not isinstance(value.get("type"), str):
         raise InputError(f"{where}: expected an object with a key 'type'; valid: {', '.join(KEYS)}")

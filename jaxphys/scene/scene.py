@@ -10,7 +10,7 @@ from typing import Literal
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.fields import NON_NEGATIVE, POSITIVE, Checked, between
-from jaxphys.scene.boundaries import Boundary, Vector
+from jaxphys.mpm.boundaries import AnyBoundary, Vector
 
 Area = tuple[float, float, float, float, float, float]
 
@@ -246,7 +246,7 @@ class Scene(Checked):
 
     objects: tuple[Object, ...] = (Object(),)
     gravity: Vector = (0.0, 0.0, -9.81)
-    boundaries: tuple[Boundary, ...] = ()
+    boundaries: tuple[AnyBoundary, ...] = ()
     domain: Domain = Domain()
     damping: float = field(default=0.0, metadata=NON_NEGATIVE)
     frames: int = field(default=48, metadata=between(1, 100_000))

@@ -1,39 +1,82 @@
+"""What each boundary does to nodes and particles, and what it refuses."""
+
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm import boundaries, particle_boundaries
-from jaxphys.mpm.boundaries import GridBoundary, box, cut, damping, half_space, walls
-from jaxphys.mpm.particle_boundaries import (
-    ParticleBoundary,
-    impulse,
-    release,
-    rotation,
-    translation,
+from jaxphys.mpm.boundaries import (
+    Box,
+    Cut,
+    Damping,
+    Impulse,
+    Plane,
+    Release,
+    Rotate,
+    Setting,
+    Translate,
+    Walls,
+    prepare,
 )
+from jaxphys.mpm.boundaries.box import box_distance
+from jaxphys.mpm.grid import Grid, node_coordinates
+from jaxphys.mpm.state import Model
 
 SHAPE, SPACING = (12, 10, 11), 0.1
-RANDOM = np.random.default_rng(6)
+GRID = Grid(SHAPE, SPACING)
 F64 = jnp.float64
+NORMAL = (0.0, 0.6, 0.8)
+SURFACES = ("sticky", "slip", "separate")
+
+
+@pytest.fixture(scope="module")
+def rest():
+    return np.random.default_rng(6).random((200, 3))
+
+
+@pytest.fixture(scope="module")
+def mass():
+    return jnp.asarray(0.5 + np.random.default_rng(7).random(200))
+
+
+@pytest.fixture(scope="module")
+def speed():
+    return jnp.asarray(np.random.default_rng(8).normal(size=(3, 200)))
+
+
+@pytest.fixture(scope="module")
+def moving():
+    """Velocities of all nodes."""
+    return jnp.asarray(np.random.default_rng(9).normal(size=(3, *SHAPE)))
+
+
+def ready(boundary, rest=((0.6, 0.6, 0.6),), dtype=F64):
+    return boundary.prepared(Setting(GRID, np.asarray(rest), np.full(len(rest), 1e-4), dtype))
 
 
 def coordinates(dtype=F64):
-    return tuple(
-        (jnp.arange(n, dtype=dtype) * jnp.asarray(SPACING, dtype)).reshape(
-            [-1 if a == axis else 1 for a in range(3)]
+    return node_coordinates(SHAPE, SPACING, np.zeros(3, int), dtype)
+
+
+def on_nodes(boundary, velocity, time=0.0, dt=1e-3):
+    return np.asarray(
+        ready(boundary, dtype=velocity.dtype).on_grid(
+            velocity, coordinates(velocity.dtype), GRID, time, dt
         )
-        for axis, n in enumerate(SHAPE)
     )
 
 
-def apply(boundary, velocity, time=0.0, dt=1e-3):
-    return boundary.apply(velocity, coordinates(velocity.dtype), time, dt)
+def wall(surface, friction=0.0, **other):
+    normal = tuple(2 * n for n in NORMAL)
+    return Plane((0.5, 0.5, 0.5), normal, surface, friction, acts_on="nodes", **other)
 
 
-def random_velocity(dtype=F64):
-    return jnp.asarray(RANDOM.normal(size=(3, *SHAPE)), dtype)
+def below():
+    x, y, z = coordinates()
+    return np.asarray(0.6 * (y - 0.5) + 0.8 * (z - 0.5) + 0 * x < -1e-9)
 
 
 def uniform(vector):
@@ -41,74 +84,80 @@ def uniform(vector):
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_walls_take_outward_motion_only_and_only_in_three_cells(dtype):
-    v = random_velocity(dtype)
-    after = apply(walls(SHAPE, SPACING, dtype=dtype), v)
+def test_walls_on_nodes_take_outward_motion_strictly_outside_of_three_cells(moving, dtype):
+    """PhysGaussian's bounding box holds nodes 0 to 2: the fourth lies on the wall and is free."""
+    v = moving.astype(dtype)
+    after = on_nodes(Walls(acts_on="nodes"), v)
     assert after.dtype == dtype
     for axis, n in enumerate(SHAPE):
         index = np.arange(n).reshape([-1 if a == axis else 1 for a in range(3)])
-        expected = jnp.where(index <= 3, jnp.maximum(v[axis], 0), v[axis])
-        expected = jnp.where(index >= n - 4, jnp.minimum(expected, 0), expected)
+        expected = jnp.where(index < 3, jnp.maximum(v[axis], 0), v[axis])
+        expected = jnp.where(index > n - 4, jnp.minimum(expected, 0), expected)
         np.testing.assert_allclose(after[axis], expected, atol=1e-6)
-    assert (after[:, 4:-4, 4:-4, 4:-4] == v[:, 4:-4, 4:-4, 4:-4]).all()
+    inner = (slice(None), *(slice(3, -3),) * 3)
+    assert (after[inner] == v[inner]).all()
 
 
-def test_walls_take_a_surface_each():
-    v = random_velocity()
+def test_walls_take_a_surface_and_a_friction_each(moving):
     six = ("sticky", "open", "open", "open", "slip", "open")
-    after = apply(walls(SHAPE, SPACING, six, dtype=F64), v)
-    assert (after[:, :4] == 0).all()
-    assert (after[2, 4:, :, :4] == 0).all()
-    assert (after[:2, 4:, :, :4] == v[:2, 4:, :, :4]).all()
-    assert (after[:, 4:, :, 4:] == v[:, 4:, :, 4:]).all()
-    with pytest.raises(InputError, match="six"):
-        walls(SHAPE, SPACING, ("slip",) * 5)
-    with pytest.raises(InputError, match="did you mean 'separate'"):
-        walls(SHAPE, SPACING, "separat")
+    after = on_nodes(Walls(surfaces=six, acts_on="nodes"), moving)
+    assert (after[:, :3] == 0).all()
+    assert (after[2, 3:, :, :3] == 0).all()
+    assert (after[:2, 3:, :, :3] == moving[:2, 3:, :, :3]).all()
+    assert (after[:, 3:, :, 3:] == moving[:, 3:, :, 3:]).all()
+    rough = Walls(frictions=(0.0, 0.0, 0.0, 0.0, 0.5, 0.0), acts_on="nodes")
+    inner = (slice(4, 8), slice(4, 6))
+    down = uniform([1.0, 0.0, -1.0])
+    np.testing.assert_allclose(on_nodes(rough, down)[0][inner][..., :3], 0.5)
+    np.testing.assert_allclose(on_nodes(rough, -down)[0][inner][..., -3:], -1.0)
 
 
-NORMAL = np.array([0.0, 0.6, 0.8])
+def test_walls_stand_where_they_are_told_at_any_spacing():
+    x = jnp.array([[0.5], [0.5], [0.13]])
+    (near,) = {round(float(min(f.distance[0] for f in ready(Walls(inset=0.12)).faces(x, 0.0))), 12)}
+    assert near == pytest.approx(0.01)
+    by_cells = min(float(f.distance[0]) for f in ready(Walls()).faces(x, 0.0))
+    assert by_cells == pytest.approx(0.13 - 3 * SPACING)
 
 
-def ground(surface, friction=0.0, **other):
-    return half_space([0.5, 0.5, 0.5], 2 * NORMAL, surface, friction, dtype=F64, **other)
-
-
-def below():
-    x, y, z = coordinates()
-    return np.asarray(0.6 * (y - 0.5) + 0.8 * (z - 0.5) + 0 * x < 0)
-
-
-def test_half_space_surfaces():
-    v = random_velocity()
+def test_plane_on_nodes_obeys_its_surface(moving):
+    v = np.asarray(moving)
     along = np.einsum("i,iabc->abc", NORMAL, v)
     inside = below()
     assert inside.any() and not inside.all()
+    n = np.reshape(NORMAL, (3, 1, 1, 1))
     expected = {
         "sticky": np.zeros_like(v),
-        "slip": v - along * NORMAL.reshape(3, 1, 1, 1),
-        "separate": v - np.minimum(along, 0) * NORMAL.reshape(3, 1, 1, 1),
+        "slip": v - along * n,
+        "separate": v - np.minimum(along, 0) * n,
     }
     for surface, held in expected.items():
-        after = apply(ground(surface), v)
-        np.testing.assert_allclose(after, np.where(inside, held, v), atol=1e-15)
+        np.testing.assert_allclose(
+            on_nodes(wall(surface), moving), np.where(inside, held, v), atol=1e-15
+        )
 
 
-def test_every_surface_is_not_sticky():
-    """In PhysGaussian a surface of any kind stops everything."""
-    v = uniform([1.0, 0.0, 0.0])
-    for surface in ("slip", "separate"):
-        np.testing.assert_allclose(apply(ground(surface), v), v, atol=1e-15)
-    assert not np.allclose(apply(ground("sticky"), v), v)
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_nodes_on_a_plane_or_on_the_faces_of_a_box_are_free(dtype):
+    v = jnp.ones((3, *SHAPE), dtype)
+    for k in range(1, SHAPE[2] - 1):
+        plane = Plane((0.0, 0.0, k * SPACING), surface="sticky")
+        held = np.all(on_nodes(plane, v) == 0, axis=(0, 1, 2))
+        assert np.flatnonzero(held).tolist() == list(range(k))
+    # 0.3 and 0.7 are node planes, and half of their difference is none of float32's numbers.
+    held = np.all(on_nodes(Box((0.5, 0.5, 0.5), (0.2, 0.2, 0.2)), v) == 0, axis=0)
+    inside = np.zeros(SHAPE, bool)
+    inside[4:7, 4:7, 4:7] = True
+    np.testing.assert_array_equal(held, inside)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3, 2.0])
-def test_friction_obeys_coulombs_cone(friction):
-    v = random_velocity()
-    after = apply(ground("separate", friction), v)
-    n = NORMAL.reshape(3, 1, 1, 1)
+def test_friction_on_nodes_obeys_coulombs_cone(moving, friction):
+    v = np.asarray(moving)
+    after = on_nodes(wall("separate", friction), moving)
+    n = np.reshape(NORMAL, (3, 1, 1, 1))
     pressed = below() & (np.einsum("i,iabc->abc", NORMAL, v) < 0)
-    taken = np.asarray(after - v)
+    taken = after - v
     normal = np.einsum("i,iabc->abc", NORMAL, taken)
     drag = np.linalg.norm(taken - normal * n, axis=0)
     assert (drag[pressed] <= friction * normal[pressed] + 1e-12).all()
@@ -124,64 +173,74 @@ def test_friction_obeys_coulombs_cone(friction):
     assert (turned <= 1e-12).all()  # friction never speeds up
 
 
-def test_a_moving_wall_carries_what_sticks_to_it():
-    wall = ground("sticky", velocity=[0.0, 0.0, 2.0], start=1.0, end=1.5)
-    v = random_velocity()
-    np.testing.assert_array_equal(apply(wall, v, time=0.9), v)
-    np.testing.assert_array_equal(apply(wall, v, time=1.5), v)
-    after = np.asarray(apply(wall, v, time=1.0))
+def test_a_moving_plane_carries_what_sticks_to_it(moving):
+    plane = wall("sticky", velocity=(0.0, 0.0, 2.0), start=1.0, end=1.5)
+    np.testing.assert_array_equal(on_nodes(plane, moving, time=0.9), moving)
+    np.testing.assert_array_equal(on_nodes(plane, moving, time=1.5), moving)
+    after = on_nodes(plane, moving, time=1.0)
     np.testing.assert_allclose(after[:, below()].T, np.tile([0, 0, 2.0], (below().sum(), 1)))
-    later = np.asarray(apply(wall, v, time=1.2))
+    later = on_nodes(plane, moving, time=1.2)
     assert (np.all(later == uniform([0, 0, 2.0]), 0)).sum() > below().sum()
 
 
-def test_a_box_moves_stops_and_lets_go():
-    b = box([0.3, 0.3, 0.3], [0.15] * 3, [1.0, 0, 0], 1.0, 1.4, rest_after=0.1, dtype=F64)
-    v = random_velocity()
+def test_a_box_carries_stops_and_lets_go(moving):
+    b = Box((0.3, 0.3, 0.3), (0.15,) * 3, (1.0, 0.0, 0.0), 1.0, 1.4, rest_after=0.1)
 
     def inside(centre):
         x, y, z = coordinates()
         return np.asarray((abs(x - centre) < 0.15) & (abs(y - 0.3) < 0.15) & (abs(z - 0.3) < 0.15))
 
-    np.testing.assert_array_equal(apply(b, v, time=0.99), v)
+    np.testing.assert_array_equal(on_nodes(b, moving, time=0.99), moving)
     for time, centre, held in ((1.0, 0.3, 1.0), (1.2001, 0.5001, 1.0), (1.45, 0.7, 0.0)):
-        after = np.asarray(apply(b, v, time=time))
-        np.testing.assert_array_equal(
-            after, np.where(inside(centre), uniform([held, 0, 0]), v), err_msg=str(time)
-        )
-    np.testing.assert_array_equal(apply(b, v, time=1.6), v)
+        expected = np.where(inside(centre), uniform([held, 0, 0]), moving)
+        np.testing.assert_array_equal(on_nodes(b, moving, time=time), expected, err_msg=str(time))
+    np.testing.assert_array_equal(on_nodes(b, moving, time=1.6), moving)
 
 
-def test_cut_lets_its_layer_slide_and_holds_the_rest():
-    c = cut([0.5, 0.55, 0.5], [0, 1, 0], lower=0.35, upper=0.65, factor=0.3, dtype=F64)
-    v = random_velocity()
-    after = np.asarray(apply(c, v))
-    np.testing.assert_array_equal(after[:, :, 6:], v[:, :, 6:])
+def test_distance_to_a_box_is_that_of_the_nearest_point():
+    half = jnp.array([0.3, 0.2, 0.1])
+    x = jnp.asarray(np.random.default_rng(3).uniform(-0.6, 0.6, (3, 300)))
+    distance, normal = box_distance(x, half)
+    nearest = jnp.clip(x, -half[:, None], half[:, None])
+    outside = np.any(np.abs(x) > half[:, None], axis=0)
+    assert outside.any() and not outside.all()
+    np.testing.assert_allclose(
+        distance[outside], jnp.linalg.norm(x - nearest, axis=0)[outside], rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        distance[~outside], -(half[:, None] - jnp.abs(x)).min(0)[~outside], rtol=1e-12
+    )
+    gradient = jax.vmap(jax.grad(lambda p: box_distance(p, half)[0]), 1, 1)(x)
+    np.testing.assert_allclose(normal, gradient, atol=1e-12)
+
+
+def test_cut_lets_its_layer_slide_and_holds_the_rest(moving):
+    after = on_nodes(Cut((0.5, 0.55, 0.5), (0.0, 1.0, 0.0), 0.35, 0.65, 0.3), moving)
+    np.testing.assert_array_equal(after[:, :, 6:], moving[:, :, 6:])
     layer = after[:, :, :6, 4:7]
-    np.testing.assert_allclose(layer[[0, 2]], 0.3 * v[:, :, :6, 4:7][jnp.array([0, 2])])
+    np.testing.assert_allclose(layer[[0, 2]], 0.3 * moving[:, :, :6, 4:7][jnp.array([0, 2])])
     np.testing.assert_allclose(layer[1], 0, atol=1e-15)
     assert (after[:, :, :6, :4] == 0).all() and (after[:, :, :6, 7:] == 0).all()
 
 
-def test_damping_does_not_depend_on_the_length_of_steps():
-    v = random_velocity()
-    d = damping(3.0, 0.0, 1.0, dtype=F64)
-    two = apply(d, apply(d, v, dt=0.05), dt=0.05)
-    np.testing.assert_allclose(two, apply(d, v, dt=0.1), rtol=1e-14)
-    np.testing.assert_allclose(two, v * np.exp(-0.3), rtol=1e-14)
-    np.testing.assert_array_equal(apply(d, v, time=1.0), v)
+def test_damping_does_not_depend_on_the_length_of_steps(moving):
+    d = Damping(3.0, 0.0, 1.0)
+    two = on_nodes(d, jnp.asarray(on_nodes(d, moving, dt=0.05)), dt=0.05)
+    np.testing.assert_allclose(two, on_nodes(d, moving, dt=0.1), rtol=1e-14)
+    np.testing.assert_allclose(two, moving * np.exp(-0.3), rtol=1e-14)
+    np.testing.assert_array_equal(on_nodes(d, moving, time=1.0), moving)
 
 
-def test_gradients_with_respect_to_friction_and_wall_velocity():
-    v, weight = random_velocity(), RANDOM.normal(size=(3, *SHAPE))
+def test_gradients_on_nodes_with_respect_to_friction_velocity_and_normal(moving):
+    weight = np.random.default_rng(1).normal(size=(3, *SHAPE))
+    plane = ready(wall("separate", 0.3, velocity=(0.1, 0.2, -0.3)))
+    plane = dataclasses.replace(plane, point=jnp.full(3, 0.47))
 
-    def loss(friction, speed, normal):
-        wall = boundaries.HalfSpace(
-            jnp.full(3, 0.47), normal, friction, speed, jnp.array(0.0), jnp.array(1.0), "separate"
-        )
-        return jnp.sum(weight * apply(wall, v))
+    def loss(friction, velocity, normal):
+        changed = dataclasses.replace(plane, friction=friction, velocity=velocity, normal=normal)
+        return jnp.sum(weight * changed.on_grid(moving, coordinates(), GRID, 0.0, 1e-3))
 
-    arguments = (jnp.array(0.3), jnp.array([0.1, 0.2, -0.3]), jnp.asarray(NORMAL))
+    arguments = (plane.friction, plane.velocity, plane.normal)
     gradients = jax.grad(loss, (0, 1, 2))(*arguments)
     h = 1e-6
     for index, gradient in enumerate(gradients):
@@ -195,118 +254,108 @@ def test_gradients_with_respect_to_friction_and_wall_velocity():
             assert float(gradient[entry]) == pytest.approx(float(up - down) / (2 * h), rel=1e-5)
 
 
-@pytest.mark.parametrize("surface", boundaries.SURFACES)
+@pytest.mark.parametrize("surface", SURFACES)
 def test_gradients_of_a_body_at_rest_are_finite(surface):
     def loss(v, friction):
-        wall = boundaries.HalfSpace(
-            jnp.full(3, 0.5), jnp.array([0, 0, 1.0]), friction, jnp.zeros(3), 0.0, 1.0, surface
-        )
-        return jnp.sum(apply(wall, v))
+        plane = dataclasses.replace(ready(wall(surface, 0.4)), friction=friction)
+        return jnp.sum(plane.on_grid(v, coordinates(), GRID, 0.0, 1e-3))
 
     gradient = jax.grad(loss, (0, 1))(jnp.zeros((3, *SHAPE)), jnp.array(0.4))
     assert all(np.isfinite(x).all() for x in gradient)
 
 
-REST = jnp.asarray(RANDOM.random((3, 200)))
-MASS = jnp.asarray(0.5 + RANDOM.random(200))
-SPEED = jnp.asarray(RANDOM.normal(size=(3, 200)))
+def test_an_impulse_gives_its_region_force_times_time_as_one_body(rest, mass, speed):
+    push = Impulse((0.25,) * 3, (0.25,) * 3, (1.0, 0.0, -2.0), duration=0.05)
+    model = Model(mass, mass, {}, jnp.zeros(3))
+
+    def given(boundary, time=0.0):
+        made = ready(boundary, rest)
+        return np.asarray(made.impulse(rest.T, speed, None, model, GRID, time, 0.01)[0])
+
+    chosen = (rest < 0.5).all(1)
+    momentum = given(push)
+    np.testing.assert_allclose(momentum.sum(1), [0.01, 0, -0.02], atol=1e-15)
+    assert np.ptp((momentum / mass)[:, chosen], axis=1).max() < 1e-15
+    assert not momentum[:, ~chosen].any() and not given(push, time=0.05).any()
+    assert not given(Impulse((9.0,) * 3, (0.1,) * 3, (1.0, 0.0, 0.0))).any()
+    each = dataclasses.replace(push, per_particle=True)
+    np.testing.assert_allclose(given(each).sum(1), momentum.sum(1) * chosen.sum())
 
 
-def act(boundary, time=0.0, dt=0.01, position=REST):
-    return np.asarray(boundary.apply(position, SPEED, REST, MASS, time, dt))
+def on_particles(boundary, rest, speed, time=0.0, position=None):
+    position = jnp.asarray(rest.T if position is None else position)
+    return np.asarray(ready(boundary, rest).on_particles(position, speed, time, 0.01))
 
 
-def test_an_impulse_gives_its_region_force_times_time_as_one_body():
-    b = impulse([1.0, 0, -2.0], [0.25] * 3, [0.25] * 3, end=0.05, dtype=F64)
-    chosen = np.asarray((REST < 0.5).all(0))
-    change = act(b) - SPEED
-    np.testing.assert_allclose((MASS * change).sum(1), [0.01, 0, -0.02], atol=1e-15)
-    assert np.ptp(change[:, chosen], axis=1).max() < 1e-15
-    np.testing.assert_array_equal(change[:, ~chosen], 0)
-    np.testing.assert_array_equal(act(b, time=0.05), SPEED)
-    empty = impulse([1.0, 0, 0], [9.0] * 3, [0.1] * 3, dtype=F64)
-    np.testing.assert_array_equal(act(empty), SPEED)
-
-
-def test_translation_acts_by_rest_positions():
-    b = translation([1.0, 2, 3], [0.25] * 3, [0.25] * 3, start=0.1, end=0.2, dtype=F64)
-    chosen = np.asarray((REST < 0.5).all(0))
-    after = act(b, 0.1, position=REST + 10)
+def test_translation_acts_by_rest_positions(rest, speed):
+    b = Translate((0.25,) * 3, (0.25,) * 3, (1.0, 2.0, 3.0), start=0.1, end=0.2)
+    chosen = (rest < 0.5).all(1)
+    after = on_particles(b, rest, speed, 0.1, position=rest.T + 10)
     np.testing.assert_array_equal(after[:, chosen].T, np.tile([1.0, 2, 3], (chosen.sum(), 1)))
-    np.testing.assert_array_equal(after[:, ~chosen], SPEED[:, ~chosen])
+    np.testing.assert_array_equal(after[:, ~chosen], speed[:, ~chosen])
     for time in (0.05, 0.2):
-        np.testing.assert_array_equal(act(b, time), SPEED)
+        np.testing.assert_array_equal(on_particles(b, rest, speed, time), speed)
 
 
-def test_rotation_turns_a_cylinder():
-    b = rotation([0.5] * 3, [0, 0, 3], 0.3, 0.4, angular_velocity=2.0, speed=0.7, dtype=F64)
-    x, y, z = np.asarray(REST) - 0.5
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_particles_on_the_faces_of_a_region_are_not_of_it(dtype):
+    line = np.stack([np.arange(12) * SPACING, np.full(12, 0.5), np.full(12, 0.5)], 1).astype(dtype)
+    made = ready(Translate((0.5, 0.5, 0.5), (0.2, 0.2, 0.2)), line, dtype)
+    assert np.flatnonzero(made.chosen).tolist() == [4, 5, 6]
+
+
+def test_rotation_turns_a_cylinder(rest, speed):
+    b = Rotate((0.5,) * 3, (0.0, 0.0, 3.0), 0.3, 0.4, angular_velocity=2.0, axial_velocity=0.7)
+    x, y, z = rest.T - 0.5
     chosen = (abs(z) < 0.3) & (x**2 + y**2 < 0.16)
-    expected = np.where(chosen, np.stack([-2 * y, 2 * x, 0 * x + 0.7]), SPEED)
-    np.testing.assert_allclose(act(b), expected, atol=1e-14)
-    with pytest.raises(InputError, match="zero"):
-        rotation([0.5] * 3, [0, 0, 0], 0.3, 0.4, 1.0)
+    expected = np.where(chosen, np.stack([-2 * y, 2 * x, 0 * x + 0.7]), speed)
+    np.testing.assert_allclose(on_particles(b, rest, speed), expected, atol=1e-14)
 
 
-def test_release_lets_go_along_its_normal():
-    b = release([0, 0, 2], 0.2, 0.8, start=1.0, end=2.0, dtype=F64)
-    z = np.asarray(REST)[2]
-    for time, plane in ((0.0, 0.2), (1.0, 0.2), (1.5, 0.5), (1.99, 0.794)):
-        held = (z > plane) & (z <= 0.8)
-        np.testing.assert_array_equal(act(b, time), np.where(held, 0, SPEED))
-    np.testing.assert_array_equal(act(b, 2.0), SPEED)
-
-
-def test_gradient_of_an_impulse_with_respect_to_its_force():
-    def loss(force):
-        b = particle_boundaries.Impulse(
-            force, jnp.full(3, 0.25), jnp.full(3, 0.25), jnp.array(0.0), jnp.array(1.0)
-        )
-        return jnp.sum(MASS * b.apply(REST, SPEED, REST, MASS, 0.0, 0.01))
-
-    np.testing.assert_allclose(jax.grad(loss)(jnp.zeros(3)), 0.01, rtol=1e-12)
-
-
-ALL = [
-    walls(SHAPE, SPACING),
-    half_space([0.0] * 3, [0, 0, 1.0]),
-    cut([0.0] * 3, [0, 0, 1.0]),
-    box([0.0] * 3, [0.1] * 3),
-    damping(1.0),
-    impulse([1.0, 0, 0], [0.0] * 3, [1.0] * 3),
-    translation([1.0, 0, 0], [0.0] * 3, [1.0] * 3),
-    rotation([0.0] * 3, [0, 0, 1.0], 1.0, 1.0, 1.0),
-    release([0, 0, 1.0], 0.0, 1.0, 0.0, 1.0),
-]
-
-
-@pytest.mark.parametrize("boundary", ALL, ids=lambda b: type(b).__name__)
-def test_boundaries_are_pytrees_of_one_family_and_keep_the_dtype(boundary):
-    assert isinstance(boundary, GridBoundary) != isinstance(boundary, ParticleBoundary)
-    leaves, tree = jax.tree.flatten(boundary)
-    assert leaves and all(leaf.dtype == jnp.float32 for leaf in leaves)
-    rebuilt = jax.tree.unflatten(tree, leaves)
-    if isinstance(boundary, GridBoundary):
-        v = random_velocity(np.float32)
-        run = jax.jit(lambda b, v: apply(b, v, jnp.float32(0), jnp.float32(1e-3)))
-    else:
-        v = SPEED.astype(np.float32)
-        r, m = REST.astype(np.float32), MASS.astype(np.float32)
-        run = jax.jit(lambda b, v: b.apply(r, v, r, m, jnp.float32(0), jnp.float32(1e-3)))
-    assert run(rebuilt, v).dtype == jnp.float32
+@pytest.mark.parametrize("down", [False, True])
+def test_release_lets_go_along_its_normal(rest, speed, down):
+    begin, finish = (0.8, 0.2) if down else (0.2, 0.8)
+    b = Release((0.0, 0.0, 2.0), begin, finish, start=1.0, end=2.0)
+    z = rest[:, 2]
+    for time, share in ((0.0, 0.0), (1.0, 0.0), (1.5, 0.5), (1.99, 0.99)):
+        plane = begin + share * (finish - begin)
+        held = (z > plane) & (z <= 0.8) if not down else (z < plane) & (z >= 0.2)
+        np.testing.assert_array_equal(on_particles(b, rest, speed, time), np.where(held, 0, speed))
+    np.testing.assert_array_equal(on_particles(b, rest, speed, 2.0), speed)
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: half_space([0] * 3, [0, 0, 0]), "normal is zero"),
-        (lambda: half_space([0] * 3, [0, 0, 1], friction=-0.1), "friction"),
-        (lambda: half_space([0] * 3, [0, 0, 1], "stick"), "did you mean 'sticky'"),
-        (lambda: half_space([0] * 2, [0, 0, 1]), "three numbers"),
-        (lambda: damping(-1.0), "rate"),
-        (lambda: walls(SHAPE, SPACING, friction=float("nan")), "friction"),
+        (lambda: Plane(normal=(0.0, 0.0, 0.0)), "normal: is zero"),
+        (lambda: Plane(friction=-0.1), "friction"),
+        (lambda: Plane(surface="stick"), "did you mean 'sticky'"),
+        (lambda: Plane(point=(0.0, 0.0)), "point: expected 3 values"),
+        (lambda: Plane(acts_on="node"), "did you mean 'nodes'"),
+        (lambda: Damping(-1.0), "rate"),
+        (lambda: Walls(friction=float("nan")), "friction"),
+        (lambda: Walls(surfaces=("slip",) * 5), "expected 6"),
+        (lambda: Walls(surfaces=("slip",) * 5 + ("opn",)), "did you mean 'open'"),
+        (lambda: Rotate((0.5,) * 3, (0.0, 0.0, 0.0), 0.3, 0.4), "axis: is zero"),
+        (lambda: ready(Plane(point=np.zeros(2))), "point: expected 3 numbers"),
     ],
 )
 def test_what_makes_no_sense_is_refused(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+def test_particles_that_start_deep_inside_are_told_of():
+    inside = np.array([[0.5, 0.5, 0.42], [0.5, 0.5, 0.9]])
+    setting = Setting(GRID, inside, np.full(2, 1e-4), F64)
+    with pytest.raises(InputError, match=r"boundaries\[1\].point: 1 particles start inside of it"):
+        prepare((Damping(1.0), Plane((0.0, 0.0, 0.5))), setting)
+    # Touching is no fault, nor is a plane that appears later or that holds nodes.
+    prepare(
+        (
+            Plane((0.0, 0.0, 0.45)),
+            Plane((0.0, 0.0, 0.5), start=0.1),
+            Plane((0.0, 0.0, 0.5), acts_on="nodes"),
+        ),
+        setting,
+    )

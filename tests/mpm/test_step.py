@@ -1,3 +1,4 @@
+import dataclasses
 from functools import partial
 
 import jax
@@ -6,11 +7,10 @@ import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.boundaries import box, damping
+from jaxphys.mpm.boundaries import Box, Damping, Setting, Translate, prepare
 from jaxphys.mpm.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.law import Law
-from jaxphys.mpm.particle_boundaries import translation
 from jaxphys.mpm.state import (
     LEFT_GRID,
     LEFT_WINDOW,
@@ -220,20 +220,21 @@ def test_wrong_input_is_named():
         initial_state(config, np.zeros((5, 3), int))
 
 
-def with_boundaries(model, *boundaries, rest=None):
-    return Model(model.mass, model.volume, model.parameters, model.gravity, boundaries, rest)
+def with_boundaries(config, model, state, *boundaries):
+    setting = Setting(config.grid, state.position.T, model.volume, model.mass.dtype)
+    return dataclasses.replace(model, boundaries=prepare(boundaries, setting))
 
 
 @pytest.mark.parametrize("window", [None, (8, 8, 8)])
 def test_grid_boundary_acts_on_the_nodes_it_names(window):
     config, model, state = block(window=window)
     # Everything is inside the box, so that every node and thus every particle moves with it.
-    everywhere = box((0.5, 0.5, 0.5), (2, 2, 2), velocity=(0.1, 0.2, 0.3), dtype=jnp.float64)
-    end = jit_step(config, with_boundaries(model, everywhere), state, DT)
+    everywhere = Box((0.5, 0.5, 0.5), (2, 2, 2), velocity=(0.1, 0.2, 0.3))
+    end = jit_step(config, with_boundaries(config, model, state, everywhere), state, DT)
     np.testing.assert_allclose(end.velocity.T, np.tile([0.1, 0.2, 0.3], (60, 1)), atol=1e-14)
     # A box around three planes of nodes pins the particles between them, and no others.
-    pinned = box((0.3, 0.5, 0.5), (0.11, 2, 2), dtype=jnp.float64)
-    end = jit_step(config, with_boundaries(model, pinned), state, DT)
+    pinned = Box((0.3, 0.5, 0.5), (0.11, 2, 2))
+    end = jit_step(config, with_boundaries(config, model, state, pinned), state, DT)
     still = np.asarray(jnp.max(jnp.abs(end.velocity), axis=0) == 0)
     x = np.asarray(state.position[0])
     np.testing.assert_array_equal(still, (x >= 0.25) & (x < 0.35))
@@ -242,23 +243,19 @@ def test_grid_boundary_acts_on_the_nodes_it_names(window):
 
 def test_particle_boundary_acts_on_the_particles_it_names():
     config, model, state = block()
-    pull = translation(
-        velocity=(0.5, 0, 0), centre=(0.3, 0.5, 0.5), half_size=(0.1, 2, 2), dtype=jnp.float64
-    )
+    pull = Translate((0.3, 0.5, 0.5), (0.1, 2, 2), velocity=(0.5, 0, 0))
     rest = state.position
     free = jit_step(config, model, state, DT)
-    end = jit_step(config, with_boundaries(model, pull, rest=rest), state, DT)
+    end = jit_step(config, with_boundaries(config, model, state, pull), state, DT)
     chosen = np.abs(np.asarray(rest[0]) - 0.3) < 0.1
     assert 0 < chosen.sum() < 60
     expected = np.where(chosen, np.array([[0.5], [0], [0]]), free.velocity)
     np.testing.assert_allclose(end.velocity, expected, atol=1e-14)
     np.testing.assert_allclose(end.position, rest + DT * expected, atol=1e-14)
-    with pytest.raises(InputError, match=r"Model\.rest"):
-        step(config, with_boundaries(model, pull), state, DT)
 
 
 def test_boundary_code_is_there_only_with_boundaries():
     config, model, state = block()
     without = primitives(config, model, state)
-    damped = primitives(config, with_boundaries(model, damping(1.0)), state)
+    damped = primitives(config, with_boundaries(config, model, state, Damping(1.0)), state)
     assert without("exp") == 0 and damped("exp") == 1

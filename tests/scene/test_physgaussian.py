@@ -96,6 +96,21 @@ def test_ficus_loads_with_its_meaning_and_notes():
         assert word in text
 
 
+def test_walls_and_surfaces_hold_the_nodes_that_theirs_hold():
+    """As many nodes as theirs, and what stands on a node plane leaves the plane's nodes free."""
+    conditions = [ALL[0][0], ALL[4][0] | {"surface": "sticky", "friction": 0}]
+    scene = from_physgaussian({"g": [0, 0, 0], "boundary_conditions": conditions}).scene
+    assert scene.domain.shape == (50, 50, 50)
+    assert [boundary.acts_on for boundary in scene.boundaries] == ["nodes", "nodes"]
+    assert scene.boundaries[0].inset is None  # three cells
+
+
+def test_rotation_turns_the_way_of_theirs():
+    """Theirs is v = -scale n x r."""
+    scene = from_physgaussian({"g": [0, 0, 0], "boundary_conditions": [ALL[6][0]]}).scene
+    assert scene.boundaries[0].angular_velocity == -1.9
+
+
 @pytest.mark.parametrize(("condition", "kind"), ALL)
 def test_every_boundary_type(condition, kind):
     loaded = from_physgaussian({"g": [0, 0, -9.8], "boundary_conditions": [condition]})

@@ -1,0 +1,170 @@
+"""What a boundary is, to a scene and to the solver: one class for both.
+
+A boundary is declared with plain numbers, in code or JSON, and is then a part of a scene.
+`prepared` gives the same class with arrays, a pytree that the solver traces: its numbers may be
+differentiated, its static fields choose the code. It acts by overriding one or more of three
+stages of a step; a stage that it does not act in is not traced.
+"""
+
+from dataclasses import dataclass, field, fields, replace
+from typing import ClassVar, Self
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.fields import NON_NEGATIVE, POSITIVE, Checked, between, direction, unit, vector
+from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.state import Model
+
+Vector = tuple[float, float, float]
+Coordinates = tuple[Array, Array, Array]
+FOREVER = 1e9
+# In cells. What lies this near to an edge lies on it, and so outside: in any precision.
+ON_EDGE = 1e-3
+
+# Metadata of fields. Static fields choose the code; derived ones are made by `prepared`, and no
+# file has a name for them.
+STATIC = {"static": True}
+DERIVED = {"keys": ()}
+PLACE = vector(between(-1e6, 1e6), unit("m"))
+HALF_SIZE = vector(POSITIVE, unit("m"))
+DIRECTION = direction()
+VELOCITY = vector(between(-1e8, 1e8), unit("m/s"))
+TIME = between(-1e9, 1e9) | unit("s")
+DURATION = NON_NEGATIVE | unit("s")
+LENGTH = POSITIVE | unit("m")
+
+
+def derived():
+    """A field that `prepared` fills."""
+    return field(default=None, kw_only=True, repr=False, metadata=DERIVED)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What boundaries are prepared for.
+
+    Attributes:
+        grid: of the solver.
+        rest: positions of all particles at time 0 (N, 3) [m].
+        volume: of the particles at rest (N,) [m^3].
+        dtype: of the simulation.
+    """
+
+    grid: Grid
+    rest: np.ndarray
+    volume: np.ndarray
+    dtype: np.dtype
+
+    def in_box(self, centre: Vector, half_size: Vector) -> np.ndarray:
+        """Which particles start inside a box, (N,); those on its faces do not."""
+        half_size = np.asarray(half_size) - ON_EDGE * self.grid.spacing
+        offset = np.abs(np.asarray(self.rest, np.float64) - np.asarray(centre))
+        return np.all(offset < half_size, axis=1)
+
+
+class Boundary(Checked):
+    """Base of all boundaries. Subclasses are frozen dataclasses and pytrees, with a `type`."""
+
+    type: ClassVar[str]
+
+    def prepared(self, setting: Setting) -> Self:
+        """The same boundary with its numbers as arrays, and with what it precomputes.
+
+        Raises:
+            InputError: naming the field that cannot be used.
+        """
+        changes = {}
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if value is not None and not ({"static", "keys"} & set(entry.metadata)):
+                changes[entry.name] = jnp.asarray(value, setting.dtype)
+                self._check_shape(entry, changes[entry.name])
+        return replace(self, **changes)
+
+    @staticmethod
+    def _check_shape(entry, value: Array) -> None:
+        shape = (entry.metadata["count"],) if "count" in entry.metadata else ()
+        if value.shape != shape:
+            wanted = f"{shape[0]} numbers" if shape else "one number"
+            raise InputError(f"{entry.name}: expected {wanted}, got shape {value.shape}")
+
+    def with_(self, **numbers) -> Self:
+        """The same prepared boundary with other numbers, which may be traced and differentiated.
+
+        Raises:
+            InputError: a name that is none of its numbers, or that of one whose code is left out.
+        """
+        known = [f.name for f in fields(self) if not ({"static", "keys"} & set(f.metadata))]
+        for name in numbers:
+            if name not in known:
+                raise InputError(f"{self.type} has no number {name!r}; {nearest(name, known)}")
+            if getattr(self, name) is None:
+                raise InputError(
+                    f"{name}: is 0 in this {self.type}, so that its code is left out; declare it "
+                    "above 0 to change or differentiate it"
+                )
+        return replace(self, **{k: jnp.asarray(v) for k, v in numbers.items()})
+
+    def acts_in(self, stage: str) -> bool:
+        """Whether a step calls the method called `stage`."""
+        return getattr(type(self), stage) is not getattr(Boundary, stage)
+
+    @property
+    def rows(self) -> int:
+        """How many rows of `State.slip` it keeps."""
+        return 0
+
+    def stiffest(self, model: Model, grid: Grid) -> Array:
+        """Largest stiffness over mass of the springs that it puts at particles [1/s^2], ().
+
+        Alone, they are stable for dt < 2 / sqrt(this).
+        """
+        return jnp.zeros((), model.mass.dtype)
+
+    def impulse(
+        self,
+        position: Array,
+        velocity: Array,
+        slip: Array | None,
+        model: Model,
+        grid: Grid,
+        time: Array,
+        dt: Array,
+    ) -> tuple[Array, Array | None]:
+        """Momentum (3, N) [kg m/s] to be added to what the particles give to the grid, and its rows
+        of `State.slip` afterwards. Position [m] and velocity [m/s] are (3, N).
+        """
+        raise NotImplementedError
+
+    def on_grid(
+        self, velocity: Array, coordinates: Coordinates, grid: Grid, time: Array, dt: Array
+    ) -> Array:
+        """Node velocities (3, nx, ny, nz) [m/s] afterwards; coordinates [m] broadcast over them."""
+        raise NotImplementedError
+
+    def on_particles(self, position: Array, velocity: Array, time: Array, dt: Array) -> Array:
+        """Particle velocities (3, N) [m/s] afterwards; position (3, N) [m] is the one before."""
+        raise NotImplementedError
+
+
+def active(time: Array, start: Array, end: Array) -> Array:
+    """Whether start <= time < end, shape ()."""
+    return (time >= start) & (time < end)
+
+
+def column(vector: Array, like) -> Array:
+    """A vector (3,) that broadcasts against (3, ...) for places `like` of any number of axes."""
+    return vector.reshape(3, *(1,) * jnp.ndim(like[0]))
+
+
+def height(x, point: Array, normal: Array) -> Array:
+    """Distance of places x, (3, ...) or three arrays that broadcast, along a unit normal [m]."""
+    return sum(normal[i] * (x[i] - point[i]) for i in range(3))
+
+
+def unit_vector(vector: Array) -> Array:
+    """vector / |vector|."""
+    return vector / jnp.sqrt(jnp.sum(vector**2))

@@ -1,0 +1,81 @@
+"""A box that holds, carries or pushes."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.core.fields import NON_NEGATIVE, one_of
+from jaxphys.mpm.boundaries.base import (
+    DURATION,
+    FOREVER,
+    HALF_SIZE,
+    PLACE,
+    STATIC,
+    TIME,
+    VELOCITY,
+    Vector,
+    active,
+    column,
+)
+from jaxphys.mpm.boundaries.contact import FAR, Contact, Face, Surface
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Box(Contact):
+    """A box that moves at a given velocity, and what is inside with it; or one that pushes.
+
+    Attributes:
+        centre, half_size: at `start` [m]; the box moves along with its velocity.
+        velocity: [m/s].
+        start, end: acts while start <= time < end [s].
+        rest_after: how long the box stands still after that [s].
+        surface: `sticky` holds all that is inside; `slip` and `separate` are as for a plane, and
+            push out what comes in through a face.
+        friction: Coulomb's coefficient; sticky ignores it.
+    """
+
+    type: ClassVar[str] = "box"
+    place: ClassVar[str] = "centre"
+    centre: Vector = field(metadata=PLACE)
+    half_size: Vector = field(metadata=HALF_SIZE)
+    velocity: Vector = field(default=(0.0, 0.0, 0.0), metadata=VELOCITY)
+    start: float = field(default=0.0, metadata=TIME)
+    end: float = field(default=FOREVER, metadata=TIME)
+    rest_after: float = field(default=0.0, metadata=DURATION)
+    surface: Surface = field(default="sticky", metadata=STATIC | one_of(Surface))
+    friction: float | None = field(default=0.0, metadata=NON_NEGATIVE)
+
+    @property
+    def kinds(self):
+        return ((self.surface, self.friction is not None),)
+
+    def faces(self, x, time: Array) -> tuple[Face, ...]:
+        moved = self.velocity * jnp.clip(time - self.start, 0, self.end - self.start)
+        velocity = jnp.where(active(time, self.start, self.end), self.velocity, 0)
+        offset = [x[i] - self.centre[i] - moved[i] for i in range(3)]
+        distance, normal = box_distance(offset, self.half_size)
+        distance = jnp.where(active(time, self.start, self.end + self.rest_after), distance, FAR)
+        return (Face(distance, normal, column(velocity, x), self.friction, self.surface),)
+
+
+def box_distance(offset, half_size: Array) -> tuple[Array, Array]:
+    """Signed distance (...) of a box [m], and the direction (3, ...) away from it.
+
+    offset: from its centre, (3, ...) or three arrays that broadcast [m]. Outside, the direction is
+    that from the nearest point; inside, that of the nearest face.
+    """
+    beyond = jnp.stack(jnp.broadcast_arrays(*(jnp.abs(offset[i]) - half_size[i] for i in range(3))))
+    out = jnp.maximum(beyond, 0)
+    squared = jnp.sum(out**2, axis=0)
+    outside = squared > 0
+    length = jnp.sqrt(jnp.where(outside, squared, 1))
+    nearest = jnp.max(beyond, axis=0)
+    # Of several that are as near, the first: the others' share would make the direction longer.
+    face = jnp.arange(3).reshape(3, *(1,) * nearest.ndim) == jnp.argmax(beyond, axis=0)
+    sign = jnp.stack([jnp.broadcast_to(jnp.sign(offset[i]), nearest.shape) for i in range(3)])
+    normal = sign * jnp.where(outside, out / length, face)
+    return jnp.where(outside, length, nearest), normal

@@ -1,0 +1,60 @@
+"""A push on a region."""
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.core.fields import POSITIVE, between, unit, vector
+from jaxphys.mpm.boundaries.base import (
+    HALF_SIZE,
+    PLACE,
+    STATIC,
+    TIME,
+    Boundary,
+    Setting,
+    Vector,
+    active,
+    derived,
+)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Impulse(Boundary):
+    """A force for a while on the particles that start inside a box, shared by mass.
+
+    PhysGaussian gives the force to each particle, which makes the motion depend on how many
+    particles there are; here it is the force on all of them together, unless asked otherwise.
+
+    Attributes:
+        centre, half_size: of the box, at rest [m].
+        force: on all of it together [N].
+        start, duration: [s].
+        per_particle: the force is meant for each particle, so that the sum grows with their
+            number.
+        chosen: the particles, (N,) bool.
+    """
+
+    type: ClassVar[str] = "impulse"
+    centre: Vector = field(metadata=PLACE)
+    half_size: Vector = field(metadata=HALF_SIZE)
+    force: Vector = field(metadata=vector(between(-1e15, 1e15), unit("N")))
+    start: float = field(default=0.0, metadata=TIME)
+    duration: float = field(default=1e-3, metadata=POSITIVE | unit("s"))
+    per_particle: bool = field(default=False, metadata=STATIC)
+    chosen: Array | None = derived()
+
+    def prepared(self, setting: Setting) -> Self:
+        chosen = setting.in_box(self.centre, self.half_size)
+        made = replace(super().prepared(setting), chosen=jnp.asarray(chosen))
+        return replace(made, force=made.force * chosen.sum()) if self.per_particle else made
+
+    def impulse(self, position, velocity, slip, model, grid, time, dt):
+        mass = jnp.where(self.chosen, model.mass, 0)
+        total = jnp.sum(mass)
+        acts = active(time, self.start, self.start + self.duration)
+        share = jnp.where(acts, mass, 0) / jnp.where(total > 0, total, 1)
+        return dt * self.force[:, None] * share, None

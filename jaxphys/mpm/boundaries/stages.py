@@ -1,0 +1,102 @@
+"""Where boundaries act in a step. What no listed boundary does is not traced."""
+
+from collections.abc import Iterable
+
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.core.errors import InputError
+from jaxphys.core.program import part
+from jaxphys.mpm.boundaries.base import Boundary, Setting
+from jaxphys.mpm.boundaries.damping import Damping
+from jaxphys.mpm.grid import Grid, node_coordinates
+from jaxphys.mpm.state import Model
+
+
+def prepare(boundaries: Iterable[Boundary], setting: Setting) -> tuple[Boundary, ...]:
+    """The boundaries as the solver wants them.
+
+    Raises:
+        InputError: naming the entry and field that cannot be used.
+    """
+    made = []
+    for i, boundary in enumerate(boundaries):
+        try:
+            made.append(boundary.prepared(setting))
+        except InputError as error:
+            raise InputError(f"boundaries[{i}].{error}") from None
+    return tuple(made)
+
+
+def acting(boundaries: Iterable[Boundary], stage: str) -> list[tuple[str, Boundary]]:
+    """Those that act in a stage, each with the name of its part of the program. Damping comes
+    first: what others prescribe is not damped.
+    """
+    listed = [
+        (f"boundary {i} {boundary.type}", boundary)
+        for i, boundary in enumerate(boundaries)
+        if boundary.acts_in(stage)
+    ]
+    return sorted(listed, key=lambda entry: not isinstance(entry[1], Damping))
+
+
+def impulses(
+    model: Model,
+    grid: Grid,
+    position: Array,
+    velocity: Array,
+    slip: Array | None,
+    time: Array,
+    dt: Array,
+) -> tuple[Array | None, Array | None]:
+    """Momentum (3, N) [kg m/s] that the boundaries add to what particles give to the grid, None if
+    none does, and the new `State.slip`.
+    """
+    total, kept, first = None, [], 0
+    for name, boundary in acting(model.boundaries, "impulse"):
+        rows = boundary.rows
+        if rows and (slip is None or slip.shape[0] < first + rows):
+            raise InputError(
+                f"State.slip has no room for {type(boundary).__name__}, which has friction; give "
+                "initial_state(..., boundaries=model.boundaries)."
+            )
+        own = slip[first : first + rows] if rows else None
+        with part(name):
+            given, own = boundary.impulse(position, velocity, own, model, grid, time, dt)
+            total = given if total is None else total + given
+        if rows:
+            kept.append(own)
+            first += rows
+    return total, jnp.concatenate(kept) if kept else slip
+
+
+def on_grid(
+    model: Model,
+    grid: Grid,
+    nodes: tuple[int, int, int],
+    origin: Array,
+    rows: Array,
+    time: Array,
+    dt: Array,
+) -> Array:
+    """Node rows (M, 4), velocity [m/s] and a void column, after the boundaries that act there.
+
+    nodes: shape of the window; origin: (3,) its first node.
+    """
+    boundaries = acting(model.boundaries, "on_grid")
+    if not boundaries:
+        return rows
+    coordinates = node_coordinates(nodes, grid.spacing, origin, rows.dtype)
+    velocity = rows.T[:3].reshape(3, *nodes)
+    for name, boundary in boundaries:
+        with part(name):
+            velocity = boundary.on_grid(velocity, coordinates, grid, time, dt)
+    return jnp.concatenate([velocity.reshape(3, -1), rows.T[3:]]).T
+
+
+def on_particles(model: Model, position: Array, velocity: Array, time: Array, dt: Array) -> Array:
+    """Particle velocities (3, N) [m/s] after the boundaries that act there."""
+    for name, boundary in acting(model.boundaries, "on_particles"):
+        with part(name):
+            velocity = boundary.on_particles(position, velocity, time, dt)
+    return velocity

@@ -1,0 +1,87 @@
+"""The six sides of the domain."""
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Literal, Self
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.core.fields import NON_NEGATIVE, one_of, unit
+from jaxphys.mpm.boundaries.base import STATIC, Setting, column, derived
+from jaxphys.mpm.boundaries.contact import Contact, Face, Surface
+
+Side = Literal["sticky", "slip", "separate", "open"]
+Sides = tuple[Side, Side, Side, Side, Side, Side]
+Frictions = tuple[float, float, float, float, float, float]
+CELLS = 3  # how far inside the domain walls stand by default: as PhysGaussian's `bounding_box`
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Walls(Contact):
+    """The six sides of the domain, some way inside it.
+
+    Attributes:
+        surface: `sticky` stops what touches it, `slip` lets it slide but not leave, `separate`
+            also lets it leave.
+        friction: Coulomb's coefficient.
+        inset: how far inside the domain the walls stand [m]; null: three cells.
+        surfaces: for -x, +x, -y, +y, -z, +z a surface each, or "open" for no wall; null: `surface`
+            for all.
+        frictions: the same for friction; null: `friction` for all.
+    """
+
+    type: ClassVar[str] = "walls"
+    place: ClassVar[str] = "inset"
+    surface: Surface = field(default="separate", metadata=STATIC | one_of(Surface))
+    friction: float | None = field(default=0.0, metadata=NON_NEGATIVE)
+    inset: float | None = field(default=None, metadata=NON_NEGATIVE | unit("m"))
+    surfaces: Sides | None = field(default=None, metadata=STATIC | one_of(Side) | {"count": 6})
+    frictions: Frictions | None = field(default=None, metadata=NON_NEGATIVE | {"count": 6})
+    size: Array | None = derived()
+
+    def prepared(self, setting: Setting) -> Self:
+        grid = setting.grid
+        inset = CELLS * grid.spacing if self.inset is None else self.inset
+        size = [(n - 1) * grid.spacing for n in grid.shape]
+        frictions = self.frictions
+        if frictions is not None:
+            frictions = tuple(jnp.asarray(f, setting.dtype) if f else None for f in frictions)
+        made = replace(self, inset=inset, size=jnp.asarray(size, setting.dtype), frictions=None)
+        return replace(Contact.prepared(made, setting), frictions=frictions)
+
+    @property
+    def _sides(self) -> tuple[tuple[int, int, Side, Array | None], ...]:
+        """(axis, which, surface, friction) of each face; which: -1 lower, 1 upper, 0 both as one,
+        since no particle touches both.
+        """
+        surfaces = self.surfaces or (self.surface,) * 6
+        sides = []
+        for axis in range(3):
+            lower, upper = surfaces[2 * axis : 2 * axis + 2]
+            if lower == upper and self.frictions is None:
+                sides.append((axis, 0, lower, self.friction))
+                continue
+            frictions = self.frictions or (self.friction,) * 6
+            sides.append((axis, -1, lower, frictions[2 * axis]))
+            sides.append((axis, 1, upper, frictions[2 * axis + 1]))
+        return tuple(side for side in sides if side[2] != "open")
+
+    @property
+    def kinds(self):
+        return tuple((surface, friction is not None) for _, _, surface, friction in self._sides)
+
+    def faces(self, x, time: Array) -> tuple[Face, ...]:
+        still = column(jnp.zeros_like(self.size), x)
+        faces = []
+        for axis, which, surface, friction in self._sides:
+            along = x[axis] - 0.5 * self.size[axis]
+            reach = 0.5 * self.size[axis] - self.inset
+            sign = -jnp.sign(along) if which == 0 else jnp.asarray(-which, along.dtype)
+            distance = reach + sign * along if which else reach - jnp.abs(along)
+            normal = jnp.stack([sign if a == axis else jnp.zeros_like(sign) for a in range(3)])
+            if normal.ndim == 1:
+                normal = column(normal, x)
+            faces.append(Face(distance, normal, still, friction, surface))
+        return tuple(faces)
