@@ -18,7 +18,7 @@ $(VENV)/installed-test: $(VENV)/installed
 	@touch $@
 
 demo: $(VENV)/installed
-	$(BIN)/jaxphys generate "a strawberry" --material jelly --out outputs/demo
+	$(BIN)/jaxphys generate "a strawberry" --material jelly --out outputs/demo --overwrite
 
 test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"

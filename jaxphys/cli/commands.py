@@ -30,12 +30,13 @@ def generate(
     precision: Literal["bfloat16", "float32"] | None = None,
     attention_slice: int | None = None,
     save_splats: bool = False,
+    overwrite: bool = False,
 ) -> int:
     """Make an object from a sentence and move it.
 
     Args:
         prompt: What the object is, for example "a strawberry". Comes from --config if left out.
-        out: Directory for everything that is made.
+        out: Directory for everything that is made: new, empty, or of an earlier run.
         material: What it is made of; `jaxphys materials` lists them. Default: jelly.
         config: Scene file: the config.json of an earlier run, or one of your own.
         seed: Of every random choice. Default: 0.
@@ -54,8 +55,9 @@ def generate(
         attention_slice: Queries a published prior attends from at a time; fewer take less memory.
             Default: 1024.
         save_splats: Also write one .ply for each picture.
+        overwrite: Replace the files of an earlier run of another request, and only these.
     """
-    from jaxphys.cli.scenes import scene_for
+    from jaxphys.cli.scenes import files_read, scene_for
     from jaxphys.pipeline.generate import generate as run
 
     changes = {"seed": seed, "width": width, "height": height, "frames": frames}
@@ -65,6 +67,8 @@ def generate(
         scene,
         out,
         save_splats=save_splats,
+        overwrite=overwrite,
+        inputs=files_read(config),
         progress=True,
         steps=steps,
         splats=splats,
@@ -93,6 +97,7 @@ def image(
     height: int | None = None,
     precision: Literal["bfloat16", "float32"] = "bfloat16",
     attention_slice: int = 1024,
+    overwrite: bool = False,
 ) -> int:
     """Paint one picture with Stable Diffusion, which shows that a checkpoint is whole.
 
@@ -109,6 +114,7 @@ def image(
         height: Pixels, likewise.
         precision: Of weights and computation.
         attention_slice: Queries attended from at a time; fewer take less memory.
+        overwrite: Replace the file if it is there.
     """
     from jaxphys.pipeline.paint import paint_file
 
@@ -118,6 +124,7 @@ def image(
         prior=prior,
         negative=negative,
         seed=seed,
+        overwrite=overwrite,
         steps=steps,
         guidance=guidance,
         sampler=sampler,
@@ -144,12 +151,13 @@ def animate(
     substep: float | None = None,
     unsafe_dt: bool = False,
     save_splats: bool = False,
+    overwrite: bool = False,
 ) -> int:
     """Move an object as its material would.
 
     Args:
         source: Splats (.ply), a mesh (.obj, .glb), or a directory made by generate.
-        out: Directory for everything that is made.
+        out: Directory for everything that is made: new, empty, or of an earlier run.
         material: What it is made of; `jaxphys materials` lists them. Default: jelly.
         config: Scene file, ours or PhysGaussian's, in place of the material's own scene.
         seed: Of every random choice. Default: 0.
@@ -160,8 +168,9 @@ def animate(
         substep: Time step [s]. Default: as large as is safe.
         unsafe_dt: Take --substep even if it is beyond what is stable.
         save_splats: Also write one .ply for each picture.
+        overwrite: Replace the files of an earlier run of another request, and only these.
     """
-    from jaxphys.cli.scenes import scene_for, with_source
+    from jaxphys.cli.scenes import files_read, scene_for, with_source
     from jaxphys.pipeline.animate import animate as run
 
     changes = {"seed": seed, "width": width, "height": height, "frames": frames, "substep": substep}
@@ -169,7 +178,15 @@ def animate(
     if unsafe_dt:
         scene = scene_for(None, None, {"unsafe_substep": True}, base=scene)
     scene, beside = with_source(scene, source, config, splats)
-    run(scene, out, beside=beside, save_splats=save_splats, progress=True)
+    run(
+        scene,
+        out,
+        beside=beside,
+        save_splats=save_splats,
+        overwrite=overwrite,
+        inputs=files_read(config, source),
+        progress=True,
+    )
     return 0
 
 
@@ -180,6 +197,7 @@ def splat(
     out: Path,
     count: int = 20_000,
     seed: int = 0,
+    overwrite: bool = False,
 ) -> int:
     """Turn a textured mesh into Gaussians.
 
@@ -188,10 +206,11 @@ def splat(
         out: The .ply (or .splat) file to write.
         count: Number of Gaussians.
         seed: Of the random points.
+        overwrite: Replace the file if it is there.
     """
     from jaxphys.pipeline.convert import splat_mesh
 
-    splat_mesh(mesh, out, count=count, seed=seed)
+    splat_mesh(mesh, out, count=count, seed=seed, overwrite=overwrite)
     return 0
 
 
@@ -208,6 +227,7 @@ def render(
     height: int = 540,
     views: int = 24,
     background: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    overwrite: bool = False,
 ) -> int:
     """Draw splats: one picture, or a turn around them.
 
@@ -222,12 +242,22 @@ def render(
         height: Pixels.
         views: Number of pictures of the turn.
         background: Red, green, blue in [0, 1].
+        overwrite: Replace the picture, or the pictures of an earlier turn, and only these.
     """
     from jaxphys.pipeline.convert import render_file
     from jaxphys.scene.scene import View
 
     view = View(azimuth, elevation, distance, field_of_view=field_of_view)
-    render_file(file, out, view, width=width, height=height, views=views, background=background)
+    render_file(
+        file,
+        out,
+        view,
+        width=width,
+        height=height,
+        views=views,
+        background=background,
+        overwrite=overwrite,
+    )
     return 0
 
 

@@ -17,6 +17,7 @@ def evaluate(
     clip: Path | None = None,
     aesthetic: Path | None = None,
     frames: int | None = None,
+    overwrite: bool = False,
     json: bool = False,
 ) -> int:
     """Score the video of a run with CLIP and LAION's aesthetic heads; status 1 if a head is
@@ -29,6 +30,7 @@ def evaluate(
             kept.
         aesthetic: Folder with the files of the heads. Default: likewise.
         frames: Score so many evenly spaced pictures. Default: all.
+        overwrite: Replace an evaluation.json that no run made.
         json: Print JSON.
     """
     from json import dumps
@@ -36,7 +38,14 @@ def evaluate(
     from jaxphys.evaluate.report import as_text
     from jaxphys.evaluate.report import evaluate as run
 
-    result = run(directory, clip=clip, aesthetic=aesthetic, prompt=prompt, frames=frames)
+    result = run(
+        directory,
+        clip=clip,
+        aesthetic=aesthetic,
+        prompt=prompt,
+        frames=frames,
+        overwrite=overwrite,
+    )
     print(dumps(result, indent=2) if json else as_text(result))
     for version, why in result["unavailable"].items():
         print(f"jaxphys: no aesthetic score {version}: {why}", file=sys.stderr)

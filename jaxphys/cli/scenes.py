@@ -49,6 +49,13 @@ def scene_for(
         raise InputError(f"--{error}") from None
 
 
+def files_read(config: Path | None, source: Path | None = None) -> tuple[Path, ...]:
+    """The scene file and the object that a command reads, which it must not replace."""
+    if source is not None and source.is_dir():
+        return tuple(path for path in (config, source / "config.json") if path is not None)
+    return tuple(path for path in (config, source) if path is not None)
+
+
 def with_source(
     scene: Scene,
     source: Path | None,

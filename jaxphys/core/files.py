@@ -1,7 +1,9 @@
 """Files that are either whole or absent."""
 
+import errno
 import json
 import os
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -9,6 +11,39 @@ from pathlib import Path
 from jaxphys.core.errors import InputError
 
 LARGEST_JSON = 64 * 1024 * 1024
+ASIDE = re.compile(r"\.jaxphys-(\d+)-(.+)", re.DOTALL)
+# What only a disk answers: whatever else fails while a file is written is for others to tell.
+DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO,
+        errno.ENAMETOOLONG, errno.EISDIR, errno.ENOTDIR, errno.ENOENT, errno.EEXIST, errno.ELOOP,
+        errno.ENOTEMPTY}  # fmt: skip
+
+
+def aside_path(path: Path) -> Path:
+    """Where this process writes `path` until it is whole. The extension is kept, since writers of
+    images and video choose a format by it."""
+    return path.with_name(f".jaxphys-{os.getpid()}-{path.name}")
+
+
+def remove_asides(folder: Path, name: str | None = None, *, alone: bool = False) -> None:
+    """Removes what killed processes left aside in `folder`, of the file `name` or of any.
+
+    Args:
+        alone: nobody else may be writing there, so that a live process of that number is another.
+    """
+    for entry in [entry for entry in folder.iterdir() if ASIDE.fullmatch(entry.name)]:
+        number, of = ASIDE.fullmatch(entry.name).groups()
+        if name in (None, of) and (alone or not _runs(int(number))):
+            entry.unlink(missing_ok=True)
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 @contextmanager
@@ -16,16 +51,46 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     """Yields a path beside `path` to write to; renames it into place on success, removes it on
     failure.
 
-    The extension is kept, since writers of images and video choose a format by it.
+    Raises:
+        InputError: the disk refuses: it is full, read-only, or something else is in the way.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    aside = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    aside = aside_path(path)
+    ours = (aside, path, *path.parents)
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        remove_asides(path.parent, path.name)
         yield aside
         os.replace(aside, path)
+    except OSError as error:
+        if error.errno not in DISK or error.filename not in (None, *map(os.fspath, ours)):
+            raise
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
-        aside.unlink(missing_ok=True)
+        if os.path.lexists(aside):
+            aside.unlink()
+
+
+def output_file(
+    path: str | os.PathLike, *, overwrite: bool, inputs: tuple[str | os.PathLike, ...] = ()
+) -> Path:
+    """`path` as a single file that may be written.
+
+    Raises:
+        InputError: it is there and `overwrite` is not given, it is one of the `inputs`, or no file.
+    """
+    path = Path(path)
+    if path.is_symlink():
+        raise InputError(f"--out {path}: is a link; name the file that it leads to")
+    if not os.path.lexists(path):
+        return path
+    if not path.is_file():
+        raise InputError(f"--out {path}: is no file; name another")
+    if any(os.path.exists(known) and os.path.samefile(known, path) for known in inputs):
+        raise InputError(f"--out {path}: is what is read; name another file")
+    if not overwrite:
+        raise InputError(f"--out {path}: is there already; --overwrite replaces it")
+    return path
 
 
 def read_json(path: str | os.PathLike) -> dict:

@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.files import read_json, write_json
+from jaxphys.core.run_folder import added_file
 from jaxphys.evaluate.aesthetic import HEADS, load_head
 from jaxphys.evaluate.clip_score import clip_score, load_clip
 from jaxphys.evaluate.frames import evenly_spaced, read_frames
@@ -42,6 +43,7 @@ def evaluate(
     aesthetic: str | Path | None = None,
     prompt: str | None = None,
     frames: int | None = None,
+    overwrite: bool = False,
 ) -> dict[str, Any]:
     """Scores the video of a run, writes evaluation.json beside it and returns what that holds.
 
@@ -51,6 +53,7 @@ def evaluate(
         aesthetic: folder with the files of the aesthetic heads; None likewise.
         prompt: None takes the run's own.
         frames: so many evenly spaced pictures; None takes all.
+        overwrite: whether an evaluation.json may be replaced that no run made.
 
     Returns:
         `prompt`; `frames`, counts `total` and `scored`; `clip` with `model`, `score` (100 max(cos,
@@ -58,7 +61,7 @@ def evaluate(
         by version, why a head gave no score.
 
     Raises:
-        InputError: there is no video, no prompt or no CLIP.
+        InputError: there is no video, no prompt or no CLIP, or the file cannot be written.
     """
     directory = Path(directory)
     if frames is not None and frames < 1:
@@ -68,6 +71,20 @@ def evaluate(
     prompt = find_prompt(directory) if prompt is None else prompt
     if not (directory / VIDEO).is_file():
         raise InputError(f"{directory / VIDEO}: is missing; run generate or animate first")
+    with added_file(directory, RESULT, overwrite=overwrite) as path:
+        result = _scored(directory, prompt, clip, aesthetic, frames)
+        write_json(path, result)
+    return result
+
+
+def _scored(
+    directory: Path,
+    prompt: str,
+    clip: str | Path | None,
+    aesthetic: str | Path | None,
+    frames: int | None,
+) -> dict[str, Any]:
+    """What `evaluate` returns."""
     model = load_clip(locate(CLIP, clip))
     pictures = read_frames(directory / VIDEO, model.size)
     chosen = evenly_spaced(len(pictures), frames)
@@ -92,7 +109,6 @@ def evaluate(
         "aesthetic": scores,
         "unavailable": unavailable,
     }
-    write_json(directory / RESULT, result)
     return result
 
 

@@ -3,33 +3,32 @@
 import dataclasses
 import json
 import os
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import jax
-
+from jaxphys.core.checkpoints import fingerprint
+from jaxphys.core.files import aside_path
+from jaxphys.core.run_folder import RunFolder, run_folder
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.gaussians.ply import write_ply
 from jaxphys.mpm.rollout import SimulationError
-from jaxphys.mpm.simulation import Simulation
 from jaxphys.pipeline.draw import deformed_gaussians
 from jaxphys.pipeline.film import Artist, film
 from jaxphys.pipeline.interrupt import deferred_interrupt
-from jaxphys.pipeline.output import Timing, run_directory, write_lines
+from jaxphys.pipeline.output import Timing, write_lines
 from jaxphys.pipeline.record import Record, recorded
-from jaxphys.pipeline.resume import Checkpoint, fingerprint
+from jaxphys.pipeline.resume import FOLDER, MotionCheckpoint
 from jaxphys.pipeline.video import write_picture
 from jaxphys.scene.build import build, validate
 from jaxphys.scene.json import to_json, write_scene
 from jaxphys.scene.look import Look
 from jaxphys.scene.scene import Scene
-from jaxphys.scene.source import load_object
+from jaxphys.scene.source import find, load_object
 
 Watch = Callable[[str, int], None]
-# What a run makes besides the object and its config; an older run's must not outlive a new one.
-MADE = ("motion.mp4", "motion.partial.mp4", "contact_sheet.png", "metrics.jsonl", "timing.json",
-        "last_good.ply", "last_good.png")  # fmt: skip
+# What an unfinished run leaves, and a finished one takes away.
+UNFINISHED = ("motion.partial.mp4", "last_good.ply", "last_good.png", FOLDER)
+MADE = ("config.json", "motion.mp4", "contact_sheet.png", "metrics.jsonl", "timing.json")
 
 
 def animate(
@@ -39,6 +38,8 @@ def animate(
     objects: tuple[Gaussians, ...] | None = None,
     beside: Path | None = None,
     save_splats: bool = False,
+    overwrite: bool = False,
+    inputs: tuple[Path, ...] = (),
     progress: bool = False,
     timing: Timing | None = None,
     watch: Watch | None = None,
@@ -52,16 +53,18 @@ def animate(
 
     Args:
         scene: what is asked for.
-        out: the directory, made if missing.
+        out: the directory: new, empty, or of an earlier run of the same request.
         objects: the Gaussians of each object; read from the scene's sources if not given.
         beside: where relative sources are looked up first.
         save_splats: whether to write every frame's Gaussians.
+        overwrite: whether the files of another request's run in `out` may be replaced.
+        inputs: files that were read to make the scene, which the run must not replace.
         progress: whether to show bars with the time left on standard error.
         timing: to add to; a new one if not given.
         watch: called as watch(stage, frame) after each frame; may raise KeyboardInterrupt.
 
     Raises:
-        InputError: the scene or an object cannot be used.
+        InputError: the scene or an object cannot be used, or `out` cannot (see `run_folder`).
         SimulationError: the motion failed; `last_good.ply` and `last_good.png` show the frame
         before.
         KeyboardInterrupt: what is done is saved.
@@ -74,12 +77,52 @@ def animate(
                 load_object(thing, beside, scene.seed + i, f"objects[{i}]")
                 for i, thing in enumerate(scene.objects)
             )
+            inputs = (*inputs, *source_files(scene, beside))
+    written = _with_written_sources(scene)
+    identity = fingerprint(b"animate", _text(written), objects)
+    names = products(scene, save_splats)
+    with run_folder(out, identity, names, inputs=inputs, overwrite=overwrite) as folder:
+        return animate_in(
+            folder,
+            scene,
+            objects,
+            save_splats=save_splats,
+            progress=progress,
+            timing=timing,
+            watch=watch,
+        )
+
+
+def products(scene: Scene, save_splats: bool) -> list[str]:
+    """The names of all files that moving a scene may make."""
+    splats = range(scene.frames if save_splats else 0)
+    return [*MADE, *UNFINISHED, *_object_names(scene), *map(_splats_name, splats)]
+
+
+def source_files(scene: Scene, beside: Path | None) -> list[Path]:
+    """The files that the objects of a scene are read from."""
+    return [find(thing.source, beside) for thing in scene.objects if thing.source is not None]
+
+
+def animate_in(
+    folder: RunFolder,
+    scene: Scene,
+    objects: tuple[Gaussians, ...],
+    *,
+    save_splats: bool,
+    progress: bool,
+    timing: Timing,
+    watch: Watch | None,
+) -> Path:
+    """As `animate`, into a folder in which the `products` of the scene are declared."""
     with timing.stage("build"):
         simulation, look = build(scene, *objects)
-    out = run_directory(out)
-    scene = _write_inputs(out, scene, objects)
-    checkpoint = Checkpoint(out, _identity(scene, simulation))
+    scene = _write_inputs(folder, scene, objects)
+    identity = fingerprint(_text(scene), (simulation.model, simulation.state))
+    checkpoint = MotionCheckpoint(folder.file(FOLDER), identity)
     record = Record()
+    video = folder.file("motion.mp4")
+    aside = aside_path(video)
     with deferred_interrupt() as interrupted:
         frames = recorded(
             simulation,
@@ -91,7 +134,6 @@ def animate(
             progress=progress,
             watch=_named(watch, "simulate"),
         )
-        aside = out / f".motion.{os.getpid()}.mp4"
         try:
             sheet = film(
                 aside,
@@ -103,47 +145,55 @@ def animate(
                 progress=progress,
                 watch=_named(watch, "render"),
             )
-            os.replace(aside, out / "motion.mp4")
+            os.replace(aside, video)
         except SimulationError:
-            _save_last_good(out, scene, look, record, timing)
+            _save_last_good(folder, scene, look, record, timing)
             raise
         except KeyboardInterrupt:
             record.save(checkpoint)
             if aside.exists():
-                os.replace(aside, out / "motion.partial.mp4")
+                os.replace(aside, folder.file("motion.partial.mp4"))
             raise
         finally:
             aside.unlink(missing_ok=True)
-    sheet.write(out / "contact_sheet.png")
-    write_lines(out / "metrics.jsonl", record.metrics)
+    sheet.write(folder.file("contact_sheet.png"))
+    write_lines(folder.file("metrics.jsonl"), record.metrics)
     if save_splats:
         with timing.stage("splats"):
             for index, frame in enumerate(record.frames):
-                write_ply(out / "splats" / f"{index:04d}.ply", deformed_gaussians(look, frame))
-    checkpoint.remove()
-    timing.write(out / "timing.json")
-    return out
+                write_ply(folder.file(_splats_name(index)), deformed_gaussians(look, frame))
+    timing.write(folder.file("timing.json"))
+    folder.remove(*UNFINISHED)
+    return folder.path
 
 
-def _identity(scene: Scene, simulation: Simulation) -> str:
-    described = json.dumps(to_json(scene), sort_keys=True) + jax.__version__
-    return fingerprint(described.encode(), (simulation.model, simulation.state))
+def _text(scene: Scene) -> bytes:
+    return json.dumps(to_json(scene), sort_keys=True).encode()
 
 
-def _write_inputs(out: Path, scene: Scene, objects: tuple[Gaussians, ...]) -> Scene:
-    """Writes the Gaussians and the config that names them; clears what an older run made."""
-    for name in MADE:
-        (out / name).unlink(missing_ok=True)
-    shutil.rmtree(out / "splats", ignore_errors=True)
-    names = ["gaussians.ply", *(f"gaussians_{i}.ply" for i in range(1, len(objects)))]
-    for name, gaussians in zip(names, objects, strict=True):
-        write_ply(out / name, gaussians)
+def _object_names(scene: Scene) -> list[str]:
+    return ["gaussians.ply", *(f"gaussians_{i}.ply" for i in range(1, len(scene.objects)))]
+
+
+def _splats_name(frame: int) -> str:
+    return f"splats/{frame:04d}.ply"
+
+
+def _with_written_sources(scene: Scene) -> Scene:
+    """The scene with its objects read from where the run writes them."""
     things = tuple(
         dataclasses.replace(thing, source=name)
-        for thing, name in zip(scene.objects, names, strict=True)
+        for thing, name in zip(scene.objects, _object_names(scene), strict=True)
     )
-    scene = dataclasses.replace(scene, objects=things)
-    write_scene(out / "config.json", scene)
+    return dataclasses.replace(scene, objects=things)
+
+
+def _write_inputs(folder: RunFolder, scene: Scene, objects: tuple[Gaussians, ...]) -> Scene:
+    """Writes the Gaussians and the config that names them."""
+    for name, gaussians in zip(_object_names(scene), objects, strict=True):
+        write_ply(folder.file(name), gaussians)
+    scene = _with_written_sources(scene)
+    write_scene(folder.file("config.json"), scene)
     return scene
 
 
@@ -151,12 +201,14 @@ def _named(watch: Watch | None, stage: str) -> Callable[[int], None] | None:
     return None if watch is None else lambda frame: watch(stage, frame)
 
 
-def _save_last_good(out: Path, scene: Scene, look: Look, record: Record, timing: Timing) -> None:
+def _save_last_good(
+    folder: RunFolder, scene: Scene, look: Look, record: Record, timing: Timing
+) -> None:
     """The frame before a failure, as Gaussians and as a picture."""
-    write_lines(out / "metrics.jsonl", record.metrics)
+    write_lines(folder.file("metrics.jsonl"), record.metrics)
     last = len(record.frames) - 1
     if last < 0:
         return
-    write_ply(out / "last_good.ply", deformed_gaussians(look, record.frames[last]))
+    write_ply(folder.file("last_good.ply"), deformed_gaussians(look, record.frames[last]))
     artist = Artist(scene, look, record.frames, timing)
-    write_picture(out / "last_good.png", artist.paint(last, record.frames[last]))
+    write_picture(folder.file("last_good.png"), artist.paint(last, record.frames[last]))

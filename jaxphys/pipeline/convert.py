@@ -7,24 +7,34 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
+from jaxphys.core.checkpoints import fingerprint
 from jaxphys.core.errors import InputError
+from jaxphys.core.files import output_file
+from jaxphys.core.run_folder import run_folder
 from jaxphys.gaussians.gaussians import Gaussians, opacities, scales, to_splats
 from jaxphys.gaussians.ply import read_ply, write_ply
 from jaxphys.gaussians.splat_file import write_splat
 from jaxphys.pipeline.framing import frame_cameras
-from jaxphys.pipeline.output import run_directory
 from jaxphys.pipeline.video import write_picture
-from jaxphys.render.camera import position
+from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import render
 from jaxphys.scene.scene import View
 from jaxphys.scene.source import load
 
 
-def splat_mesh(mesh: str | os.PathLike, out: str | os.PathLike, *, count: int, seed: int) -> None:
+def splat_mesh(
+    mesh: str | os.PathLike,
+    out: str | os.PathLike,
+    *,
+    count: int,
+    seed: int,
+    overwrite: bool = False,
+) -> None:
     """Writes a mesh as `count` Gaussians to a .ply or .splat file.
 
     Raises:
-        InputError: the mesh cannot be read, or `out` has another ending.
+        InputError: the mesh cannot be read, `out` has another ending, or is there and `overwrite`
+            is not given.
     """
     writers = {".ply": write_ply, ".splat": write_splat}
     out = Path(out)
@@ -32,6 +42,7 @@ def splat_mesh(mesh: str | os.PathLike, out: str | os.PathLike, *, count: int, s
         raise InputError(f"--out {out}: must end in .ply or .splat")
     if count < 1:
         raise InputError(f"--count {count}: must be at least 1")
+    output_file(out, overwrite=overwrite, inputs=(mesh,))
     writers[out.suffix.lower()](out, load(mesh, count=count, seed=seed))
 
 
@@ -55,11 +66,13 @@ def render_file(
     height: int,
     views: int,
     background: tuple[float, float, float],
+    overwrite: bool = False,
 ) -> None:
     """Draws a .ply of splats to a .png file, or as `views` pictures of a full turn to a directory.
 
     Raises:
-        InputError: the file cannot be read, or a number is out of range.
+        InputError: the file cannot be read, a number is out of range, or `out` cannot be written
+            (see `output_file` and `run_folder`).
     """
     for name, value, most in (
         ("width", width, 8192),
@@ -75,13 +88,22 @@ def render_file(
     single = out.suffix.lower() == ".png"
     if not single and out.suffix:
         raise InputError(f"--out {out}: must end in .png, or name a directory")
-    points = outline(gaussians)
     count = 1 if single else views
     turning = view if single else replace(view, turn=360 / views)
-    cameras = frame_cameras(turning, [points] * count, 1.0, width, height)
-    directory = None if single else run_directory(out)
-    for index, camera in enumerate(cameras):
-        splats = to_splats(gaussians, position(camera))
-        image = render(splats, camera, background=jnp.asarray(background, jnp.float32))
-        pixels = np.asarray(jnp.round(255 * jnp.clip(image.colour, 0, 1)).astype(jnp.uint8))
-        write_picture(out if single else directory / f"{index:04d}.png", pixels)
+    cameras = frame_cameras(turning, [outline(gaussians)] * count, 1.0, width, height)
+    pictures = (_picture(gaussians, camera, background) for camera in cameras)
+    if single:
+        write_picture(output_file(out, overwrite=overwrite), next(pictures))
+        return
+    request = fingerprint(b"render", repr((turning, width, height, background)).encode(), gaussians)
+    names = [f"{index:04d}.png" for index in range(views)]
+    with run_folder(out, request, names, inputs=(Path(file),), overwrite=overwrite) as folder:
+        for name, pixels in zip(names, pictures, strict=True):
+            write_picture(folder.file(name), pixels)
+
+
+def _picture(gaussians: Gaussians, camera: Camera, background: tuple) -> np.ndarray:
+    """(H, W, 3) uint8."""
+    splats = to_splats(gaussians, position(camera))
+    image = render(splats, camera, background=jnp.asarray(background, jnp.float32))
+    return np.asarray(jnp.round(255 * jnp.clip(image.colour, 0, 1)).astype(jnp.uint8))

@@ -1,30 +1,33 @@
 """A sentence in, a directory with a moving object out."""
 
 import dataclasses
+import json
 import os
 import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
+from jaxphys.core.checkpoints import Checkpoints, by_name, fingerprint, from_names
 from jaxphys.core.errors import InputError
 from jaxphys.core.files import read_json, write_json
+from jaxphys.core.run_folder import RunFolder, run_folder
+from jaxphys.core.seals import is_sound, seal
 from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.gaussians.ply import read_ply, write_ply
 from jaxphys.guidance.prompts.refine import Refinement, check_prompt, refine
-from jaxphys.pipeline.animate import Watch, animate
+from jaxphys.pipeline.animate import Watch, animate_in, products
 from jaxphys.pipeline.interrupt import deferred_interrupt
-from jaxphys.pipeline.output import Timing, run_directory
+from jaxphys.pipeline.output import Timing
 from jaxphys.pipeline.record import SAVE_EVERY
-from jaxphys.pipeline.resume import FOLDER, Checkpoint, fingerprint
+from jaxphys.pipeline.resume import FOLDER
 from jaxphys.scene.build import validate
+from jaxphys.scene.json import to_json
 from jaxphys.scene.scene import Generation, Scene
 
-FIELDS = {entry.name for entry in dataclasses.fields(Refinement)}
+PROMPT = "prompt.json"
 
 
 def _asked(
@@ -50,6 +53,8 @@ def generate(
     out: str | os.PathLike,
     *,
     save_splats: bool = False,
+    overwrite: bool = False,
+    inputs: tuple[Path, ...] = (),
     progress: bool = False,
     watch: Watch | None = None,
     **changes: Any,
@@ -61,8 +66,8 @@ def generate(
     Args:
         prompt: the sentence; None takes the one in the scene.
         scene: whose first object the sentence describes.
-        out: the directory, made if missing.
-        save_splats, progress, watch: as for `animate`.
+        out: the directory: new, empty, or of an earlier run of the same request.
+        save_splats, overwrite, inputs, progress, watch: as for `animate`.
         changes: fields of `Generation` that differ from those in the scene, such as `steps`,
             `splats`, `prior`, `shape_prior`; None changes nothing.
 
@@ -75,47 +80,59 @@ def generate(
     scene, generation = _asked(prompt, scene, changes)
     validate(scene)
     choice.require(generation.prior, generation.shape_prior, dtype=generation.precision)
-    refinement = _refined(generation, Path(out))
-    out = run_directory(out)
-    write_json(out / "prompt.json", dataclasses.asdict(refinement))
-    with timing.stage("generate"):
-        gaussians = _gaussians(refinement, scene, generation, out, progress)
-    return animate(
-        scene,
-        out,
-        objects=(gaussians,),
-        save_splats=save_splats,
-        progress=progress,
-        timing=timing,
-        watch=watch,
-    )
+    # Everything that is asked for decides the result, the refiner too.
+    identity = fingerprint(b"generate", _text(scene))
+    names = [PROMPT, *products(scene, save_splats)]
+    with run_folder(out, identity, names, inputs=inputs, overwrite=overwrite) as folder:
+        refinement = _refined(generation, folder, identity)
+        write_json(folder.file(PROMPT), dataclasses.asdict(refinement))
+        with timing.stage("generate"):
+            gaussians = _gaussians(refinement, scene, generation, folder, progress)
+        return animate_in(
+            folder,
+            scene,
+            (gaussians,),
+            save_splats=save_splats,
+            progress=progress,
+            timing=timing,
+            watch=watch,
+        )
 
 
-def _refined(generation: Generation, out: Path) -> Refinement:
-    """The prompt refined, or as an unfinished run in `out` has it: a language model may answer
-    differently the second time, and the run could not go on."""
-    if (out / FOLDER).is_dir() and (out / "prompt.json").is_file():
-        known = read_json(out / "prompt.json")
-        if known.get("original") == generation.prompt and set(known) == FIELDS:
-            return Refinement(**known)
-    return refine(generation.prompt, how=generation.refiner)
+def _text(value: Any) -> bytes:
+    return json.dumps(to_json(value), sort_keys=True).encode()
+
+
+def _refined(generation: Generation, folder: RunFolder, identity: str) -> Refinement:
+    """The prompt refined, or as an unfinished run of the same request has it: a language model may
+    answer differently the second time, and the run could not go on."""
+    kept = folder.path / FOLDER / PROMPT
+    if is_sound(kept, identity):
+        return Refinement(**read_json(kept))
+    refinement = refine(generation.prompt, how=generation.refiner)
+    kept = folder.file(FOLDER) / PROMPT
+    write_json(kept, dataclasses.asdict(refinement))
+    seal(kept, identity)
+    return refinement
 
 
 def _gaussians(
-    refinement: Refinement, scene: Scene, generation: Generation, out: Path, progress: bool
+    refinement: Refinement, scene: Scene, generation: Generation, folder: RunFolder, progress: bool
 ) -> Gaussians:
     """The object: kept from an interrupted run of the same request, or made."""
-    how = dataclasses.replace(generation, prompt=refinement.refined, refiner="auto")
-    asked = (how, scene.seed)
-    kept = out / FOLDER / f"object-{fingerprint(repr(asked).encode())[:16]}.ply"
-    if not kept.exists():
-        checkpoint = Checkpoint(out, fingerprint(repr(asked).encode(), ()))
-        write_ply(kept, _optimise(refinement.refined, scene.seed, generation, checkpoint, progress))
+    how = dataclasses.replace(generation, prompt=refinement.refined)
+    identity = fingerprint(b"object", _text(how), str(scene.seed).encode())
+    kept = folder.file(FOLDER) / "object.ply"
+    if not is_sound(kept, identity):
+        checkpoints = Checkpoints(folder.file(FOLDER) / "object", identity)
+        made = _optimise(refinement.refined, scene.seed, generation, checkpoints, progress)
+        write_ply(kept, made)
+        seal(kept, identity)
     return read_ply(kept)
 
 
 def _optimise(
-    prompt: str, seed: int, generation: Generation, checkpoint: Checkpoint, progress: bool
+    prompt: str, seed: int, generation: Generation, checkpoints: Checkpoints, progress: bool
 ) -> Gaussians:
     """Runs `text_to_gaussians`, going on from a checkpoint and saving one when interrupted."""
     from jaxphys.guidance import choice, optimise
@@ -132,12 +149,10 @@ def _optimise(
         dtype=generation.precision,
         attention_slice=generation.attention_slice,
     )
-    resume, done = None, checkpoint.frame()
-    if done is not None:
-        arrays = checkpoint.load(done)
+    resume, newest = None, checkpoints.newest()
+    if newest is not None:
         cloud = from_points(np.zeros((config.count, 3), np.float32), np.zeros(3), 1.0)
-        structure = jax.tree.structure(optimise.start(cloud, config))
-        resume = structure.unflatten([jnp.asarray(arrays[name]) for name in sorted(arrays)])
+        resume = from_names(optimise.start(cloud, config), newest[1])
     saved = time.monotonic()
     with deferred_interrupt() as interrupted:
 
@@ -145,10 +160,7 @@ def _optimise(
             nonlocal saved
             stop = interrupted()
             if stop or time.monotonic() - saved > SAVE_EVERY:
-                leaves = jax.tree.leaves(state)
-                checkpoint.save(
-                    int(state.step), {f"leaf_{i:03d}": leaf for i, leaf in enumerate(leaves)}
-                )
+                checkpoints.save(int(state.step), by_name(state))
                 saved = time.monotonic()
             if stop:
                 raise KeyboardInterrupt

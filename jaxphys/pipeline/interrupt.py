@@ -11,24 +11,24 @@ def deferred_interrupt() -> Iterator[Callable[[], bool]]:
     """Yields a function that tells whether an interrupt has come in.
 
     The first Ctrl-C only sets the answer, so that work reaches a point from which it can be
-    resumed;
-    the second one interrupts at once. Outside the main thread, where signals cannot be taken,
-    nothing
-    changes.
+    resumed; the second one interrupts at once, and any that follow are ignored until the block is
+    left, so that what is half done can be taken away. Outside the main thread, where signals
+    cannot be taken, nothing changes.
     """
-    asked = threading.Event()
+    asked = 0
     if threading.current_thread() is not threading.main_thread():
-        yield asked.is_set
+        yield lambda: False
         return
     before = signal.getsignal(signal.SIGINT)
 
     def note(number, frame):
-        if asked.is_set():
+        nonlocal asked
+        asked += 1
+        if asked == 2:
             raise KeyboardInterrupt
-        asked.set()
 
     signal.signal(signal.SIGINT, note)
     try:
-        yield asked.is_set
+        yield lambda: asked > 0
     finally:
         signal.signal(signal.SIGINT, before)

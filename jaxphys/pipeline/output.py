@@ -1,32 +1,12 @@
-"""A run's directory: what is written, when, and how long each stage took."""
+"""What a run says of itself: rows of numbers, and how long each stage took."""
 
 import json
 import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
-from jaxphys.core.errors import InputError
 from jaxphys.core.files import atomic_path, write_json
-
-
-def run_directory(path: str | os.PathLike) -> Path:
-    """`path` as a directory that can be written to, made if it is missing.
-
-    Raises:
-        InputError: it is a file, or cannot be made or written.
-    """
-    path = Path(path)
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise InputError(f"--out {path}: is a file; name a directory") from None
-    except OSError as error:
-        raise InputError(f"--out {path}: cannot be made ({error.strerror})") from None
-    if not os.access(path, os.W_OK | os.X_OK):
-        raise InputError(f"--out {path}: cannot be written to; choose another directory")
-    return path
 
 
 def write_lines(path: str | os.PathLike, rows: list[dict]) -> None:

@@ -4,22 +4,32 @@ from pathlib import Path
 from typing import Any
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.files import output_file
 from jaxphys.pipeline.video import write_picture
 
 
 def paint_file(
-    prompt: str, out: Path, *, prior: str, negative: str, seed: int, **settings: Any
+    prompt: str,
+    out: Path,
+    *,
+    prior: str,
+    negative: str,
+    seed: int,
+    overwrite: bool = False,
+    **settings: Any,
 ) -> None:
     """Writes `prompt` painted by a Stable Diffusion, given by name or folder, as the .png `out`.
 
     `settings` are those of `PaintConfig`. Raises InputError for a bad setting, another extension,
-    or weights that cannot be had, before anything is computed.
+    a file that is there and not to be overwritten, or weights that cannot be had, before anything
+    is computed.
     """
     from jaxphys.guidance.choice import image_folder
     from jaxphys.guidance.published.text_to_image import PaintConfig, paint
 
     if out.suffix.lower() != ".png":
         raise InputError(f"--out {out}: must end in .png")
+    output_file(out, overwrite=overwrite)
     config = PaintConfig(**settings)
     folder = image_folder(prior, dtype=config.dtype)
     write_picture(out, paint(prompt, folder, negative=negative, seed=seed, config=config))

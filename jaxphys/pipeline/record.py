@@ -1,21 +1,17 @@
 """The frames of a run as they are made, kept so that an interrupted run goes on where it was."""
 
-import json
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-import jax
-import jax.numpy as jnp
-import numpy as np
 from tqdm import tqdm
 
 from jaxphys.mpm.motion import Frame
 from jaxphys.mpm.simulation import Simulation
-from jaxphys.mpm.state import State, Status
-from jaxphys.pipeline.frames import frames
+from jaxphys.mpm.state import State
+from jaxphys.pipeline.frames import Moment, frames
 from jaxphys.pipeline.output import Timing
-from jaxphys.pipeline.resume import Checkpoint
+from jaxphys.pipeline.resume import MotionCheckpoint
 
 SAVE_EVERY = 20.0  # seconds of work that an interruption without warning may cost
 
@@ -27,57 +23,38 @@ class Record:
     Attributes:
         frames: of the particles that carry Gaussians.
         metrics: numbers of each frame, ready for JSON.
-        state: all that is needed to go on after the last of them.
-        saved: how many frames the checkpoint holds.
+        reached: number of a frame and all that is needed to go on after it; set last, so that an
+            interrupt between two of these leaves a frame too many at most.
     """
 
     frames: list[Frame] = field(default_factory=list)
     metrics: list[dict] = field(default_factory=list)
-    state: State | None = None
-    saved: int = 0
+    reached: tuple[int, State] | None = None
 
-    def save(self, checkpoint: Checkpoint) -> None:
-        """To a checkpoint, unless all of it is there."""
-        if self.saved == len(self.frames):
-            return
-        leaves = jax.tree.leaves(self.state)
-        arrays = {f"state_{i:02d}": leaf for i, leaf in enumerate(leaves)}
-        arrays["positions"] = np.stack([frame.position for frame in self.frames])
-        arrays["deformations"] = np.stack([frame.deformation for frame in self.frames])
-        arrays["times"] = np.stack([frame.time for frame in self.frames])
-        arrays["statuses"] = np.stack([np.stack(frame.status) for frame in self.frames])
-        arrays["metrics"] = np.frombuffer(json.dumps(self.metrics).encode(), np.uint8)
-        checkpoint.save(len(self.frames) - 1, arrays)
-        self.saved = len(self.frames)
+    def add(self, moment: Moment) -> None:
+        """The next frame."""
+        self.frames.append(moment.frame)
+        self.metrics.append(moment.metrics)
+        self.reached = moment.number, moment.state
 
-    def restore(self, checkpoint: Checkpoint, like: State) -> None:
+    def save(self, checkpoint: MotionCheckpoint) -> None:
+        """To a checkpoint: what it does not hold yet."""
+        if self.reached is not None:
+            number, state = self.reached
+            checkpoint.save(state, self.frames[: number + 1], self.metrics[: number + 1])
+
+    def restore(self, checkpoint: MotionCheckpoint, like: State) -> None:
         """From a checkpoint, if there is one."""
-        done = checkpoint.frame()
-        if done is None:
-            return
-        arrays = checkpoint.load(done)
-        leaves = [jnp.asarray(arrays[name]) for name in sorted(arrays) if name.startswith("state_")]
-        self.state = jax.tree.unflatten(jax.tree.structure(like), leaves)
-        self.metrics = json.loads(arrays["metrics"].tobytes())
-        carriers = np.arange(arrays["positions"].shape[1], dtype=np.int32)
-        self.frames = [
-            Frame(position, deformation, moment, Status(*status), carriers)
-            for position, deformation, moment, status in zip(
-                arrays["positions"],
-                arrays["deformations"],
-                arrays["times"],
-                arrays["statuses"],
-                strict=True,
-            )
-        ]
-        self.saved = len(self.frames)
+        if found := checkpoint.restore(like):
+            number, state, self.frames, self.metrics = found
+            self.reached = number, state
 
 
 def recorded(
     simulation: Simulation,
     count: int,
     record: Record,
-    checkpoint: Checkpoint,
+    checkpoint: MotionCheckpoint,
     *,
     interrupted: Callable[[], bool],
     timing: Timing,
@@ -104,8 +81,7 @@ def recorded(
     yield from record.frames
     if len(record.frames) >= count:
         return
-    start = (len(record.frames) - 1, record.state) if record.frames else None
-    moments = frames(simulation, start=start, particles=simulation.carriers, timing=timing)
+    moments = frames(simulation, start=record.reached, particles=simulation.carriers, timing=timing)
     saved = time.monotonic()
     with tqdm(
         total=count,
@@ -115,9 +91,7 @@ def recorded(
         disable=not progress,
     ) as bar:
         for moment in moments:
-            record.frames.append(moment.frame)
-            record.metrics.append(moment.metrics)
-            record.state = moment.state
+            record.add(moment)
             bar.update()
             stop = interrupted()
             try:

@@ -1,74 +1,79 @@
-"""Frame-level checkpoints (orbax): an interrupted run goes on where it was, to the same bytes."""
+"""What an interrupted simulation goes on from: its newest state, and each frame saved once."""
 
-import hashlib
-import shutil
+import json
+import sys
 from pathlib import Path
-from typing import Any
 
-import jax
 import numpy as np
 
-FOLDER = "checkpoint"
+from jaxphys.core.checkpoints import Checkpoints, by_name, from_names
+from jaxphys.mpm.motion import Frame, Motion, join
+from jaxphys.mpm.state import State, Status
+
+FOLDER = "checkpoint/"
 
 
-def fingerprint(*parts: bytes | Any) -> str:
-    """A hash of bytes and of pytrees of arrays: what decides a run and the program that runs
-    it.
-    """
-    digest = hashlib.sha256()
-    for part in parts:
-        if isinstance(part, bytes):
-            digest.update(part)
-            continue
-        leaves, structure = jax.tree.flatten(part)
-        digest.update(str(structure).encode())
-        for leaf in leaves:
-            array = np.ascontiguousarray(leaf)
-            digest.update(f"{array.dtype}{array.shape}".encode())
-            digest.update(array.tobytes())
-    return digest.hexdigest()
+class MotionCheckpoint:
+    """A motion in a folder, extended by each save with what is new.
 
-
-class Checkpoint:
-    """One checkpoint in a directory, replaced by each new one.
+    `frames/` keeps every frame, in pieces named by their last one; `state/` the two newest states.
 
     Args:
-        directory: of the run; the checkpoint lives in `checkpoint/` under it.
-        identity: fingerprint of the run; a checkpoint of another run is never used.
+        folder: for both.
+        identity: fingerprint of all that decides the motion.
     """
 
-    def __init__(self, directory: Path, identity: str):
-        self._root = Path(directory).absolute() / FOLDER
-        self._identity = identity
+    def __init__(self, folder: Path, identity: str):
+        self._frames = Checkpoints(folder / "frames", identity, keep=None)
+        self._states = Checkpoints(folder / "state", identity)
+        self._saved = 0
 
-    def _path(self, frame: int) -> Path:
-        return self._root / f"{self._identity[:16]}-{frame:06d}"
+    def save(self, state: State, frames: list[Frame], metrics: list[dict]) -> None:
+        """Saves the state at the last of these frames, and of the frames those that are new."""
+        last = len(frames) - 1
+        if self._saved <= last:
+            text = json.dumps(metrics[self._saved :]).encode()
+            arrays = by_name(join(frames[self._saved :]))
+            arrays |= {"first": np.int64(self._saved), "metrics": np.frombuffer(text, np.uint8)}
+            self._frames.save(last, arrays)
+            self._saved = last + 1
+        if last not in self._states.steps():
+            self._states.save(last, by_name(state))
 
-    def frame(self) -> int | None:
-        """The frame of the newest whole checkpoint of this run, None if there is none."""
-        found = sorted(self._root.glob(f"{self._identity[:16]}-" + "[0-9]" * 6))
-        return int(found[-1].name.rsplit("-", 1)[1]) if found else None
+    def restore(self, like: State) -> tuple[int, State, list[Frame], list[dict]] | None:
+        """The newest state of which all frames are whole, its number, the frames up to it and what
+        is known of each; None if there is none.
 
-    def save(self, frame: int, arrays: dict[str, Any]) -> None:
-        """Saves arrays by name; the checkpoint before it goes once the new one is whole."""
-        import orbax.checkpoint as ocp
+        What is damaged is said on standard error, and so is what the motion goes on from then.
+        """
+        pieces, known = [], 0
+        for last in self._frames.steps():
+            piece = self._frames.load(last)
+            if int(piece["first"]) != known:
+                break
+            pieces.append((last, piece))
+            known = last + 1
+        newest = max(self._frames.steps() + self._states.steps(), default=-1)
+        self._states.drop_after(known - 1)
+        found = self._states.newest()
+        number = found[0] if found else -1
+        if number < newest:
+            where = f"goes on from frame {number}" if found else "starts anew"
+            print(f"jaxphys: the simulation {where}", file=sys.stderr)
+        self._frames.drop_after(number)
+        self._saved = number + 1
+        if not found:
+            return None
+        frames: list[Frame] = []
+        metrics: list[dict] = []
+        for piece in (piece for last, piece in pieces if last <= number):
+            motion = _motion(piece)
+            frames.extend(motion[index] for index in range(len(motion)))
+            metrics.extend(json.loads(piece["metrics"].tobytes()))
+        return number, from_names(like, found[1]), frames, metrics
 
-        before = list(self._root.glob("*-" + "[0-9]" * 6))
-        target = self._path(frame)
-        with ocp.StandardCheckpointer() as writer:
-            writer.save(target, {k: np.asarray(v) for k, v in arrays.items()}, force=True)
-        for old in before:
-            if old != target:
-                shutil.rmtree(old)
 
-    def load(self, frame: int) -> dict[str, np.ndarray]:
-        """The arrays saved at `frame`."""
-        import orbax.checkpoint as ocp
-
-        with ocp.StandardCheckpointer() as reader:
-            return reader.restore(self._path(frame))
-
-    def remove(self) -> None:
-        """Removes every checkpoint of the directory."""
-        if self._root.is_dir():
-            shutil.rmtree(self._root)
+def _motion(piece: dict[str, np.ndarray]) -> Motion:
+    status = Status(*(piece[f"status/{name}"] for name in Status._fields))
+    names = ("position", "deformation", "time")
+    return Motion(*(piece[name] for name in names), status, piece["carriers"])

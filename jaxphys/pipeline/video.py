@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
+from imageio.v3 import imwrite
 from PIL import Image
 
 from jaxphys.core.errors import InputError
@@ -65,18 +66,34 @@ class VideoWriter:
 
     def close(self) -> None:
         """Finishes the file. Raises `InputError` if the encoder failed."""
-        self._queue.put(None)
-        self._thread.join()
-        _, complaint = self._process.communicate()
+        try:
+            self._queue.put(None)
+            self._thread.join()
+            _, complaint = self._process.communicate()
+        except BaseException:
+            self._abandon()
+            raise
         if self._process.returncode or self._failure:
             text = " ".join(complaint.decode(errors="replace").split())[-200:]
             raise InputError(f"motion.mp4: the encoder failed: {text or self._failure}")
 
+    def _abandon(self) -> None:
+        """Ends the encoder; the file is of no use."""
+        self._process.kill()
+        self._process.wait()
+        self._queue.put(None)
+        self._thread.join()
+        self._process.stdin.close()
+        self._process.stderr.close()
+
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_) -> None:
-        self.close()
+    def __exit__(self, kind: type | None, *_) -> None:
+        if kind is None or kind is KeyboardInterrupt:  # what is there so far is worth having
+            self.close()
+        else:
+            self._abandon()
 
 
 class ContactSheet:
@@ -115,4 +132,4 @@ class ContactSheet:
 def write_picture(path: str | os.PathLike, picture: np.ndarray) -> None:
     """Writes (height, width, 3) uint8 as a PNG, aside first."""
     with atomic_path(path) as aside:
-        Image.fromarray(picture).save(aside, format="PNG")
+        imwrite(aside, picture, extension=".png", plugin="pillow")

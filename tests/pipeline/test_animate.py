@@ -4,6 +4,7 @@ import json
 import numpy as np
 import pytest
 
+from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.gaussians.ply import read_ply, write_ply
 from jaxphys.mpm.rollout import SimulationError
@@ -109,7 +110,15 @@ def test_a_checkpoint_of_another_scene_is_not_used(tmp_path):
         animate(small_scene(), tmp_path, objects=(sphere(),), watch=interrupt)
     seen = []
     other = small_scene(seed=1)
-    animate(other, tmp_path, objects=(sphere(),), watch=lambda at, done: seen.append((at, done)))
+    with pytest.raises(InputError, match="another request"):
+        animate(other, tmp_path, objects=(sphere(),))
+    animate(
+        other,
+        tmp_path,
+        objects=(sphere(),),
+        overwrite=True,
+        watch=lambda at, done: seen.append((at, done)),
+    )
     assert [done for at, done in seen if at == "simulate"] == [1, 2, 3]
 
 

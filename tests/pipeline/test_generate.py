@@ -65,7 +65,7 @@ def test_an_interrupted_run_keeps_the_object(calls, tmp_path):
         generate("a can", SCENE, tmp_path, watch=interrupt)
     generate("a can", SCENE, tmp_path)
     assert len(calls) == 1
-    generate("a can", dataclasses.replace(SCENE, seed=1), tmp_path)
+    generate("a can", dataclasses.replace(SCENE, seed=1), tmp_path, overwrite=True)
     assert len(calls) == 2
 
 
