@@ -17,9 +17,10 @@ def seal(path: Path, identity: str, **facts: Any) -> None:
     """Records the SHA-256 of the file `path`, or of every file in the folder `path`, with the
     request that it belongs to, in PATH.sha256.json or PATH/sha256.json. The last thing to do.
     """
-    body = json.dumps({"identity": identity, "files": _hashes(path), **facts}, sort_keys=True)
+    facts = {"identity": identity, "files": _hashes(path), **facts}
+    body = json.dumps(facts, sort_keys=True).encode()
     with atomic_path(_seal_of(path)) as aside:
-        aside.write_text(f"{hashlib.sha256(body.encode()).hexdigest()}\n{body}\n")
+        aside.write_bytes(hashlib.sha256(body).hexdigest().encode() + b"\n" + body)
 
 
 def read_seal(path: Path) -> dict[str, Any]:
@@ -31,16 +32,16 @@ def read_seal(path: Path) -> dict[str, Any]:
     try:
         if path.is_symlink():
             raise ValueError("it is a link")
-        known, body, end = _seal_of(path).read_text().split("\n")
-        if end or hashlib.sha256(body.encode()).hexdigest() != known:
+        known, _, body = _seal_of(path).read_bytes().partition(b"\n")
+        if hashlib.sha256(body).hexdigest().encode() != known:
             raise ValueError("its seal is damaged")
         facts = json.loads(body)
         if _hashes(path) != facts["files"]:
             raise ValueError("its SHA-256 differs")
     except FileNotFoundError:
         raise ValueError("it was not finished") from None
-    except (OSError, UnicodeError) as error:
-        raise ValueError(f"it cannot be read: {error}") from None
+    except OSError as error:
+        raise ValueError(f"it cannot be read ({error.strerror})") from None
     return facts
 
 

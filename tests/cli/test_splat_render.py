@@ -41,9 +41,8 @@ def box(tmp_path_factory):
 
 def draw(file, out, *options):
     """Runs the command on small pictures."""
-    return run(
-        ["render", str(file), "--out", str(out), "--width", "64", "--height", "48", *options]
-    )
+    size = ["--width", "64", "--height", "48"]
+    return run(["render", str(file), "--out", str(out), "--overwrite", *size, *options])
 
 
 def picture(path):
@@ -151,6 +150,7 @@ def test_a_failure_keeps_what_was_there(box, tmp_path, capsys):
     for name, command in (("a.ply", "splat"), ("a.png", "render")):
         (tmp_path / name).write_bytes(b"before")
         (tmp_path / "broken.ply").write_bytes(b"ply\n")
-        assert run([command, str(tmp_path / "broken.ply"), "--out", str(tmp_path / name)]) == 2
+        broken, out = str(tmp_path / "broken.ply"), str(tmp_path / name)
+        assert run([command, broken, "--out", out, "--overwrite"]) == 2
         assert "broken.ply" in capsys.readouterr().err
         assert (tmp_path / name).read_bytes() == b"before"

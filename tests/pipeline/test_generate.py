@@ -130,3 +130,68 @@ def test_an_unfinished_run_keeps_its_prompt(calls, tmp_path, monkeypatch):
     assert [prompt for prompt, *_ in calls] == ["first"]
     generate("a can", SCENE, tmp_path)
     assert json.loads((tmp_path / "prompt.json").read_text())["refined"] == "second"
+
+
+@pytest.fixture
+def unfinished(calls, tmp_path):
+    """The folder of a run that was interrupted when its object had been made."""
+
+    def interrupt(stage, frame):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        generate("a can", SCENE, tmp_path / "out", watch=interrupt)
+    calls.clear()
+    return tmp_path / "out"
+
+
+def flip(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 4
+    path.write_bytes(content)
+
+
+def test_another_refiner_is_another_request(calls, unfinished):
+    with pytest.raises(InputError, match="another request"):
+        generate("a can", SCENE, unfinished, refiner="rules")
+    out = generate("a can", SCENE, unfinished, refiner="rules", overwrite=True)
+    assert len(calls) == 1
+    assert json.loads((out / "config.json").read_text())["generation"]["refiner"] == "rules"
+
+
+@pytest.mark.parametrize("name", ["object.ply", "prompt.json"])
+def test_what_was_kept_and_is_damaged_is_made_again_and_said(calls, unfinished, capsys, name):
+    flip(unfinished / "checkpoint" / name)
+    out = generate("a can", SCENE, unfinished)
+    assert len(calls) == (name == "object.ply")
+    assert f"{name}: is not used, its SHA-256 differs" in capsys.readouterr().err
+    assert json.loads((out / "prompt.json").read_text())["original"] == "a can"
+    again = generate("a can", SCENE, unfinished.parent / "again")
+    for name in ("prompt.json", "gaussians.ply", "motion.mp4"):
+        assert (again / name).read_bytes() == (out / name).read_bytes()
+
+
+def test_an_optimisation_goes_on_where_it_was_interrupted(calls, tmp_path, monkeypatch):
+    """Every step's state is `step` ones; a damaged checkpoint gives way to the one before."""
+    seen = []
+
+    def made(prompt, *, config, resume, on_step, **options):
+        state = optimise.start(from_points(np.zeros((40, 3), np.float32), np.zeros(3), 1.0), config)
+        first = 0 if resume is None else int(resume.step)
+        seen.append(first)
+        for step in range(first + 1, config.steps + 1):
+            on_step(state._replace(step=np.int32(step), pull=np.full(state.pull.shape, step)))
+            if step == 5 and len(seen) == 1:
+                raise KeyboardInterrupt
+        return from_points(np.full((40, 3), seen[-1], np.float32), np.full(3, 0.5), 0.3)
+
+    monkeypatch.setattr(optimise, "text_to_gaussians", made)
+    monkeypatch.setattr(generate_module, "SAVE_EVERY", -1.0)  # after each step
+    options = {"steps": 6, "splats": 40}
+    with pytest.raises(KeyboardInterrupt):
+        generate("a can", SCENE, tmp_path, **options)
+    steps = tmp_path / "checkpoint/object"
+    assert sorted(path.name for path in steps.iterdir()) == ["4", "5"]
+    flip(next(path for path in sorted((steps / "5").rglob("*")) if path.is_file()))
+    generate("a can", SCENE, tmp_path, **options)
+    assert seen == [0, 4] and not (tmp_path / "checkpoint").exists()
