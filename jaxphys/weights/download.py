@@ -2,6 +2,8 @@
 
 import hashlib
 import http.client
+import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,11 +22,13 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.files import atomic_path
 from jaxphys.weights.catalogue import Entry, File
 from jaxphys.weights.places import hub_cache
+from jaxphys.weights.verify import difference
 
 HUB = "https://huggingface.co"
 PATIENCE = 4.0  # seconds for a first answer, so that no network is noticed within five
 STALL = 30.0  # seconds without a byte
 BLOCK = 1024**2
+INCOMING = ".incoming"  # folder beside the files for what has not been compared yet
 SLACK = 1.05  # of a size that is not exact
 AGENT = {"User-Agent": "jaxphys"}
 
@@ -53,10 +57,13 @@ def unreachable(url: str) -> str | None:
     return reasons[0] if reasons else f"no answer within {PATIENCE:g} s"
 
 
-def from_hub(entry: Entry, files: tuple[File, ...], environment: Mapping[str, str]) -> Path:
-    """Fetches `files` into the hub's own cache; returns the folder of that revision.
+def from_hub(
+    entry: Entry, files: tuple[File, ...], folder: Path, environment: Mapping[str, str]
+) -> None:
+    """Fetches `files` into `folder`, as far as a repository has them. They arrive in a folder
+    aside, where a later call goes on, and only those that are the pinned ones leave it.
 
-    Raises InputError if no repository of the entry gives them.
+    Raises InputError if no repository of the entry can be read, or what it gives is another file.
     """
     endpoint = environment.get("HF_ENDPOINT") or HUB
     if reason := unreachable(endpoint):
@@ -65,18 +72,40 @@ def from_hub(entry: Entry, files: tuple[File, ...], environment: Mapping[str, st
 
     refusals = []
     for repository in entry.repositories:
+        incoming = folder / INCOMING / repository.replace("/", "--")
         try:
-            return Path(
-                snapshot_download(
-                    repository,
-                    cache_dir=hub_cache(environment),
-                    allow_patterns=[file.path for file in files],
-                    endpoint=endpoint,
-                )
+            snapshot_download(
+                repository,
+                local_dir=incoming,
+                cache_dir=hub_cache(environment) or folder / INCOMING,  # what is there is copied
+                allow_patterns=[file.path for file in files],
+                endpoint=endpoint,
             )
         except Exception as error:  # its own, its HTTP library's and the system's
             refusals.append(f"{repository}: {' '.join(str(error).split()) or error!r}")
+            continue
+        if wrong := _accept(files, incoming, folder):
+            refusals.append(f"{repository}: {wrong}")
+            continue
+        shutil.rmtree(folder / INCOMING, ignore_errors=True)
+        return
     raise InputError("; ".join(refusals))
+
+
+def _accept(files: tuple[File, ...], incoming: Path, folder: Path) -> str | None:
+    """Moves what is right of `files` into `folder` and removes what is not; tells of the latter."""
+    wrong = []
+    for file in files:
+        arrived, place = incoming / file.path, folder / file.path
+        if not arrived.is_file():
+            continue
+        if problem := difference(arrived, file):
+            wrong.append(f"{file.path} {problem}")
+            arrived.unlink()
+        else:
+            place.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(arrived, place)
+    return ", ".join(wrong) or None
 
 
 def from_urls(files: tuple[File, ...], folder: Path) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
+from jaxphys.core.errors import InputError
 from jaxphys.weights.catalogue import Entry, File
 from jaxphys.weights.safetensors_files import choices
 
@@ -17,26 +18,43 @@ STANDS_FOR = {
 }
 
 
+def expanded(path: str) -> Path | None:
+    """`path` with ~ replaced; None where there is no home directory that it could stand for."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        return None
+
+
 def own_folder(entry: Entry, environment: Mapping[str, str]) -> Path:
-    """Where this package keeps the files of `entry`, and where a user is to put them."""
-    return Path(environment.get(VARIABLE) or SHARED).expanduser() / entry.name
+    """Where this package keeps the files of `entry`, and where a user is to put them.
+
+    Raises:
+        InputError: that is in a home directory, and there is none.
+    """
+    folder = expanded(environment.get(VARIABLE) or SHARED)
+    if folder is None:
+        raise InputError(f"there is no home directory; set ${VARIABLE} to a folder for weights")
+    return folder / entry.name
 
 
-def hub_cache(environment: Mapping[str, str]) -> Path:
-    """Where the Hugging Face hub's library keeps what it fetched; by its own rules."""
+def hub_cache(environment: Mapping[str, str]) -> Path | None:
+    """Where the Hugging Face hub's library keeps what it fetched, by its own rules; None where that
+    is in a home directory, and there is none."""
     for variable in ("HF_HUB_CACHE", "HUGGINGFACE_HUB_CACHE"):
         if environment.get(variable):
-            return Path(environment[variable]).expanduser()
+            return expanded(environment[variable])
     caches = environment.get("XDG_CACHE_HOME") or "~/.cache"
     home = environment.get("HF_HOME") or f"{caches}/huggingface"
-    return Path(home).expanduser() / "hub"
+    return expanded(f"{home}/hub")
 
 
 def places(entry: Entry, environment: Mapping[str, str]) -> Iterator[Path]:
     """The folders that may hold the files of `entry`, the first to be taken first."""
     yield own_folder(entry, environment)
-    for repository in entry.repositories:
-        yield from _snapshots(hub_cache(environment), repository)
+    cache = hub_cache(environment)
+    for repository in entry.repositories if cache is not None else ():
+        yield from _snapshots(cache, repository)
     if entry.package:
         yield from _package_folders(entry.package)
 

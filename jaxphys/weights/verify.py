@@ -13,7 +13,6 @@ from jaxphys.weights.places import best_place, file_sets, stand_in
 from jaxphys.weights.safetensors_files import open_arrays
 from jaxphys.weights.torch_zip import read_torch_zip
 
-BLOCK = 1024**2
 INDEX = ".safetensors.index.json"
 
 
@@ -50,12 +49,10 @@ def _verdict(folder: Path, file: File, entry: Entry) -> Verdict:
         return Verdict(file.path, None, "not known", "missing")
     relative, size = path.relative_to(folder).as_posix(), path.stat().st_size
     known = {f.path: f for f in (*entry.files, *entry.half, *entry.instead)}.get(relative)
-    if known is not None and known.exact and size != known.size:
-        problem = f"has {size} bytes instead of {known.size}"
-        return Verdict(relative, size, "not known", problem)
+    if known is not None and (problem := difference(path, known)):
+        hashed = not known.exact or size == known.size
+        return Verdict(relative, size, "differs" if hashed else "not known", problem)
     if known is not None and known.sha256 is not None:
-        if _sha256(path) != known.sha256:
-            return Verdict(relative, size, "differs", "is another file: its SHA-256 differs")
         return Verdict(relative, size, "matches", None)
     try:
         _open(path)
@@ -64,12 +61,19 @@ def _verdict(folder: Path, file: File, entry: Entry) -> Verdict:
     return Verdict(relative, size, "not known", None)
 
 
+def difference(path: Path, known: File) -> str | None:
+    """How the file `path` differs from the published one, as far as that is pinned, or None."""
+    size = path.stat().st_size
+    if known.exact and size != known.size:
+        return f"has {size} bytes instead of {known.size}"
+    if known.sha256 is not None and _sha256(path) != known.sha256:
+        return "is another file: its SHA-256 differs"
+    return None
+
+
 def _sha256(path: Path) -> str:
-    digest = hashlib.sha256()
     with path.open("rb") as file:
-        while block := file.read(BLOCK):
-            digest.update(block)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _open(path: Path) -> None:

@@ -173,9 +173,9 @@ def test_the_hub_gives_exactly_our_files(monkeypatch, environment, online, tmp_p
     with serving(hub({REPOSITORY: files})) as (address, asked):
         environment["HF_ENDPOINT"] = address
         folder = locate("net", environment=environment)
-        assert folder == tmp_path / "hub/models--people--net/snapshots" / COMMIT
+        assert folder == tmp_path / "weights/net"
         assert (folder / "unet/net.pth").read_bytes() == BODY
-        found = {path.relative_to(folder).as_posix() for path in folder.rglob("*.*")}
+        found = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
         assert found == {"a.json", "unet/net.pth"}
         known = len(asked)
         assert locate("net", environment=environment) == folder
@@ -185,7 +185,7 @@ def test_the_hub_gives_exactly_our_files(monkeypatch, environment, online, tmp_p
 
 def test_parts_from_the_hub(monkeypatch, environment, online):
     files = {"unet/net.pth": BODY, "vae/net.pth": BODY}
-    catalogued(monkeypatch, *(File(path, 1) for path in files), repositories=(REPOSITORY,))
+    catalogued(monkeypatch, *(File(path, len(BODY)) for path in files), repositories=(REPOSITORY,))
     with serving(hub({REPOSITORY: files})) as (address, _):
         environment["HF_ENDPOINT"] = address
         folder = locate("net", parts=("vae",), environment=environment)
@@ -199,8 +199,8 @@ def test_half_precision_where_it_is_published(monkeypatch, environment, online, 
     catalogued(
         monkeypatch,
         File("a", 1),
-        File("net.safetensors", 2),
-        half=(File("net.fp16.safetensors", 1),),
+        File("net.safetensors", len(BODY), SHA256),
+        half=(File("net.fp16.safetensors", len(BODY), SHA256),),
         repositories=(REPOSITORY,),
     )
     both = {"a": b"1", "net.safetensors": BODY} | {published: BODY}
@@ -223,6 +223,75 @@ def test_no_repository_is_left(monkeypatch, environment, online):
     with serving(hub({})) as (address, _):
         environment["HF_ENDPOINT"] = address
         refused("gone/net: .*people/net: ", locate, "net", environment=environment)
+
+
+KNOWN = {"a": File("a", 1), "net.pth": File("net.pth", len(BODY), SHA256)}
+
+
+def fetching(monkeypatch, environment, repositories):
+    """Looks for "a" and "net.pth" at a hub with these repositories, in order."""
+    catalogued(monkeypatch, *KNOWN.values(), repositories=tuple(repositories))
+    with serving(hub(repositories)) as (address, asked):
+        return locate("net", environment=environment | {"HF_ENDPOINT": address}), asked
+
+
+@pytest.mark.parametrize(
+    ("body", "match"),
+    [
+        (BODY[:-1] + b"x", "net.pth is another file: its SHA-256 differs"),
+        (BODY[:-1], "net.pth has 2097151 bytes instead of 2097152"),
+        (BODY + b"x", "net.pth has 2097153 bytes"),
+    ],
+)
+def test_what_the_hub_sends_and_is_not_the_known_file_does_not_count(
+    monkeypatch, environment, online, tmp_path, body, match
+):
+    """Nor is it kept; what was right is."""
+    wrong = {REPOSITORY: {"a": b"1", "net.pth": body}}
+    for _ in range(2):
+        refused(match, fetching, monkeypatch, environment, wrong)
+        assert not any(path.name == "net.pth" for path in tmp_path.rglob("*"))
+        assert (tmp_path / "weights/net/a").read_bytes() == b"1"
+    folder, _ = fetching(monkeypatch, environment, {REPOSITORY: {"a": b"2", "net.pth": BODY}})
+    assert (folder / "net.pth").read_bytes() == BODY and (folder / "a").read_bytes() == b"1"
+    assert sorted(path.name for path in folder.iterdir()) == ["a", "net.pth"]
+
+
+def test_another_repository_is_asked_where_one_sends_another_file(monkeypatch, environment, online):
+    both = {"bad/net": {"a": b"1", "net.pth": BODY[::-1]}, REPOSITORY: {"a": b"1", "net.pth": BODY}}
+    folder, _ = fetching(monkeypatch, environment, both)
+    assert (folder / "net.pth").read_bytes() == BODY
+
+
+def test_what_a_killed_fetch_left_does_not_count(monkeypatch, environment, online, tmp_path):
+    """It was whole, but nobody had compared it."""
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    right = {REPOSITORY: {"a": b"1", "net.pth": BODY}}
+    with monkeypatch.context() as patched:
+        patched.setattr(download, "difference", killed)
+        with pytest.raises(KeyboardInterrupt):
+            fetching(monkeypatch, environment, {REPOSITORY: {"a": b"1", "net.pth": BODY[::-1]}})
+    assert any(path.name == "net.pth" for path in tmp_path.rglob("*"))
+    refused("HF_HUB_OFFLINE", locate, "net", environment=environment | {"HF_HUB_OFFLINE": "1"})
+    refused("SHA-256 differs", fetching, monkeypatch, environment, right)
+    folder, _ = fetching(monkeypatch, environment, right)
+    assert (folder / "net.pth").read_bytes() == BODY
+
+
+def test_what_the_hubs_own_cache_has_is_compared_too(monkeypatch, environment, online, tmp_path):
+    """A snapshot that lacks a file is not completed there, but copied from; wrong files are not."""
+    snapshot = tmp_path / "hub/models--people--net/snapshots" / COMMIT
+    snapshot.mkdir(parents=True)
+    (snapshot / "net.pth").write_bytes(BODY[::-1])
+    refused("SHA-256 differs", fetching, monkeypatch, environment,
+            {REPOSITORY: {"a": b"1", "net.pth": BODY}})  # fmt: skip
+    (snapshot / "net.pth").write_bytes(BODY)
+    folder, asked = fetching(monkeypatch, environment, {REPOSITORY: {"a": b"1", "net.pth": BODY}})
+    assert (folder / "net.pth").read_bytes() == BODY
+    assert not any("GET" in line and "net.pth" in line for line in asked)
 
 
 # No network.

@@ -1,5 +1,6 @@
 """Files are found where they may be, in order, and never fetched where they must not."""
 
+import pwd
 import sys
 from pathlib import Path
 
@@ -198,3 +199,27 @@ def test_nothing_is_fetched_unasked(environment):
 
 def test_an_unknown_name(environment):
     refused("unknown name 'nett'; did you mean 'net'", "nett", environment=environment)
+
+
+def test_without_a_home_directory(tmp_path, environment, monkeypatch):
+    """A variable that says where is enough; without it the line says which to set."""
+
+    def nobody(_):
+        raise KeyError
+
+    monkeypatch.delenv("HOME")
+    monkeypatch.setattr(pwd, "getpwuid", nobody)
+    del environment["HF_HUB_CACHE"]
+    write(tmp_path / "weights/net")
+    assert locate("net", environment=environment) == tmp_path / "weights/net"
+    del environment["JAXPHYS_WEIGHTS"]
+    refused(r"no home directory; set \$JAXPHYS_WEIGHTS", "net", environment=environment)
+    environment["JAXPHYS_WEIGHTS"] = "~/weights"
+    refused(r"no home directory", "net", environment=environment)
+
+
+def test_a_folder_for_weights_that_cannot_be_written(tmp_path, environment):
+    del environment["HF_HUB_OFFLINE"]
+    (tmp_path / "file").write_text("")
+    environment |= {"JAXPHYS_WEIGHTS": str(tmp_path / "file"), "HF_ENDPOINT": "http://127.0.0.1:9"}
+    refused("not on this computer", "net", environment=environment)

@@ -18,6 +18,7 @@ from jaxphys.guidance.prompts.endpoint import Unanswered
 from jaxphys.guidance.prompts.language_model import LanguageModel, Message, Sampling
 from jaxphys.guidance.prompts.rules import LONG, without_background
 from jaxphys.guidance.prompts.subject import subject
+from jaxphys.weights.places import expanded
 from jaxphys.weights.resolve import locate
 
 PATH = "JAXPHYS_LLM_PATH"
@@ -157,9 +158,9 @@ def find_local(environment: Mapping[str, str]) -> LocalModel | None:
     """
     given = environment.get(PATH, "").strip()
     if given:
-        path = Path(given).expanduser()
-        if not path.exists():
-            raise InputError(f"{PATH}: {path} is missing; name a .gguf file or a folder")
+        path = expanded(given)
+        if path is None or not path.exists():
+            raise InputError(f"{PATH}: {given} is missing; name a .gguf file or a folder")
         return LocalModel(path)
     try:
         found = locate("smollm2", fetch=False, environment=environment)
