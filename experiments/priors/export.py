@@ -11,12 +11,13 @@ import json
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import orbax.checkpoint as ocp
 from flax import nnx
 from safetensors.numpy import save_file
 
+from experiments.priors.training import checkpoints_of
 from jaxphys import weights
 from jaxphys.guidance.bundled.pixel_prior import PixelPrior, PixelPriorConfig
 from jaxphys.guidance.bundled.point_prior import PointPrior, PointPriorConfig
@@ -33,15 +34,13 @@ DATA = (
 )
 
 
-def averaged(run: Path, names: list[str]) -> tuple[dict[str, np.ndarray], int]:
+def averaged(run: Path, parameters: dict[str, Any]) -> tuple[dict[str, np.ndarray], int]:
     """The averaged weights of the newest checkpoint, and its step."""
-    with ocp.CheckpointManager(run.resolve() / "checkpoints") as manager:
-        step = manager.latest_step()
-        if step is None:
-            raise SystemExit(f"{run}: holds no checkpoint; train first")
-        state = manager.restore(step, args=ocp.args.StandardRestore())
-    average = state["average"] if isinstance(state, dict) else state.average
-    return {name: average[name] for name in names}, step
+    newest = checkpoints_of(run.resolve(), parameters).newest()
+    if newest is None:
+        raise SystemExit(f"{run}: holds no checkpoint of this network; train first")
+    step, arrays = newest
+    return {name: arrays[f"average/{name}"] for name in parameters}, step
 
 
 def samples_seen(lines: list[dict], step: int) -> int:
@@ -73,7 +72,7 @@ def main() -> None:
     kind, config_type, script = KINDS[options.name]
     config = config_type()
     module = nnx.eval_shape(lambda: kind(config, rngs=nnx.Rngs(0)))
-    arrays, step = averaged(options.run, list(named_parameters(module)))
+    arrays, step = averaged(options.run, named_parameters(module))
     lines = [json.loads(line) for line in (options.run / "log.jsonl").read_text().splitlines()]
     trained = [line["options"] for line in lines if "options" in line][-1]
     reports = [line for line in lines if "held_out" in line and line["step"] <= step]

@@ -5,6 +5,7 @@ the run that was not. It trains in bfloat16 with float32 master weights, on any 
 """
 
 import argparse
+import hashlib
 import json
 import signal
 import time
@@ -18,12 +19,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-import orbax.checkpoint as ocp
 from flax import nnx
 from jax import Array
 from PIL import Image
 
 from experiments.priors.muon import muon
+from jaxphys.core.checkpoints import Checkpoints, by_name, from_names
 from jaxphys.guidance.diffusion.schedule import add_noise, interpret
 from jaxphys.networks.parameters import named_parameters, with_parameters
 
@@ -170,6 +171,14 @@ def stop_on_signal() -> Iterator[Callable[[], bool]]:
             signal.signal(number, handler)
 
 
+def checkpoints_of(run: Path, parameters: dict[str, Any]) -> Checkpoints:
+    """The checkpoints of a training run. Options and versions may change from piece to piece, the
+    network may not."""
+    network = {name: [*array.shape] for name, array in parameters.items()}
+    identity = hashlib.sha256(json.dumps(network, sort_keys=True).encode()).hexdigest()
+    return Checkpoints(run / "checkpoints", identity)
+
+
 def train(task: Task, options: argparse.Namespace) -> None:
     """Trains for `options.minutes` from the newest checkpoint in `options.run`, or from scratch."""
     run = options.run.resolve()
@@ -177,12 +186,9 @@ def train(task: Task, options: argparse.Namespace) -> None:
     transform = optimiser(options)
     parameters = named_parameters(task.module)
     state = TrainState(parameters, parameters, transform.init(parameters), jnp.zeros((), jnp.int32))
-    manager = ocp.CheckpointManager(
-        run / "checkpoints", options=ocp.CheckpointManagerOptions(max_to_keep=2)
-    )
-    if manager.latest_step() is not None:
-        target = jax.tree.map(ocp.utils.to_shape_dtype_struct, state)
-        state = manager.restore(manager.latest_step(), args=ocp.args.StandardRestore(target))
+    checkpoints = checkpoints_of(run, parameters)
+    if newest := checkpoints.newest():
+        state = from_names(state, newest[1])
     step, evaluate = make_step(task, transform, options), evaluator(task)
     log = (run / "log.jsonl").open("a", buffering=1)
     settings = {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items()}
@@ -210,12 +216,10 @@ def train(task: Task, options: argparse.Namespace) -> None:
                 report(losses, now - last_report)
                 losses, last_report = [], time.monotonic()
             if now - last_save > 60 * options.save_minutes:
-                manager.save(int(state.step), args=ocp.args.StandardSave(state))
+                checkpoints.save(int(state.step), by_name(state))
                 last_save = now
-        if manager.latest_step() != int(state.step):
-            manager.save(int(state.step), args=ocp.args.StandardSave(state))
-        manager.wait_until_finished()
+        if int(state.step) not in checkpoints.steps():
+            checkpoints.save(int(state.step), by_name(state))
         if losses and not stopping():
             report(losses, time.monotonic() - last_report)
     log.close()
-    manager.close()

@@ -3,7 +3,7 @@
     python -m experiments.scorer.train DATA --out WEIGHTS.safetensors [--steps 800] [--batch 64]
 
 DATA is what `experiments.scorer.renders` wrote. The averaged weights are written every 50 steps,
-with all that the next step depends on beside them (WEIGHTS.state.npz): the same command goes on.
+with all that the next step depends on beside them (WEIGHTS.checkpoints): the same command goes on.
 """
 
 import argparse
@@ -22,7 +22,7 @@ from jax import Array
 from experiments.scorer.augment import augment
 from experiments.scorer.evaluate import held_out_report
 from experiments.scorer.model import Scorer, ScorerConfig, save
-from jaxphys.core.files import atomic_path
+from jaxphys.core.checkpoints import Checkpoints, by_name, fingerprint, from_names
 from jaxphys.guidance.bundled.text_encoder import load_text_encoder
 from jaxphys.networks.parameters import named_parameters, with_parameters
 
@@ -101,20 +101,6 @@ def make_step(module: Scorer, transform: optax.GradientTransformation, options):
     return step
 
 
-def save_state(path: Path, state: State) -> None:
-    """Writes every array of the state, whole or not at all."""
-    leaves = {f"leaf_{k:04d}": np.asarray(leaf) for k, leaf in enumerate(jax.tree.leaves(state))}
-    with atomic_path(path) as aside:
-        np.savez(aside, **leaves)
-
-
-def restore_state(path: Path, like: State) -> State:
-    """The state written by `save_state`, of the structure of `like`."""
-    with np.load(path) as file:
-        leaves = [jnp.asarray(file[name]) for name in sorted(file.files)]
-    return jax.tree.structure(like).unflatten(leaves)
-
-
 def draw_batch(
     images: np.ndarray, captions: Captions, batch: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -148,9 +134,12 @@ def main() -> None:
     rate = optax.warmup_cosine_decay_schedule(0.0, options.rate, 50, options.steps)
     transform = optax.chain(optax.clip_by_global_norm(1.0), optax.adamw(rate, weight_decay=0.05))
     state = State(parameters, parameters, transform.init(parameters), jnp.zeros((), jnp.int32))
-    kept = options.out.with_suffix(".state.npz")
-    if kept.exists():
-        state = restore_state(kept, state)
+    asked = (items, options.steps, options.batch, options.rate, options.seed, options.dtype)
+    checkpoints = Checkpoints(
+        options.out.with_suffix(".checkpoints"), fingerprint(json.dumps(asked).encode(), parameters)
+    )
+    if newest := checkpoints.newest():
+        state = from_names(state, newest[1])
     step = make_step(module, transform, options)
     losses, before = [], time.process_time()
     while (count := int(state.step)) < options.steps:
@@ -161,7 +150,7 @@ def main() -> None:
         losses.append(float(value))
         if (count + 1) % SAVE_EVERY == 0 or count + 1 == options.steps:
             save(options.out, state.average, config)
-            save_state(kept, state)
+            checkpoints.save(count + 1, by_name(state))
             spent = round(time.process_time() - before)
             print(f"step {count + 1}: loss {np.mean(losses):.4f}, {spent} CPU s", flush=True)
             losses = []
