@@ -2,14 +2,19 @@
 
 import shutil
 import sys
+from dataclasses import replace
 from typing import NamedTuple
 
+import jax
 import numpy as np
 import pytest
 
+from jaxphys.mpm.motion import Frame
+from jaxphys.mpm.state import Status
 from jaxphys.pipeline.resume import MotionCheckpoint
 
 LAST = 7
+CARRIERS = np.arange(4, dtype=np.int32)
 CHANGES = {"open", "os.mkdir", "os.remove", "os.rename", "os.rmdir"}
 
 
@@ -21,26 +26,34 @@ class Counted(NamedTuple):
 
 def frames_until(last):
     """What a motion looks like up to a frame, every number another one."""
-    positions = [np.full((4, 3), frame, np.float32) for frame in range(last + 1)]
-    gradients = [np.full((4, 3, 3), -frame, np.float32) for frame in range(last + 1)]
-    return positions, gradients, [{"frame": frame, "é": [0.5]} for frame in range(last + 1)]
+    frames = []
+    for number in range(last + 1):
+        position = np.full((4, 3), number, np.float32)
+        gradient = np.full((4, 3, 3), -number, np.float32)
+        status = Status(*(np.int32(number) for _ in Status._fields))
+        frames.append(Frame(position, gradient, np.float32(number / 8), status, CARRIERS))
+    return frames, [{"frame": number, "é": [0.5]} for number in range(last + 1)]
+
+
+def same(one, other):
+    return all(
+        np.array_equal(a, b) for a, b in zip(*map(jax.tree.leaves, (one, other)), strict=True)
+    )
 
 
 def run(folder, saves=(2, 3, LAST)):
-    """Computes up to the last frame from where the checkpoint is; the frames computed again."""
+    """Computes up to the last frame from where the checkpoint is; the first frame that it has to
+    compute."""
     checkpoint = MotionCheckpoint(folder, "a")
     found = checkpoint.restore(Counted(np.int32(0)))
-    first = 0 if found is None else int(found[0].steps) + 1
-    frames = frames_until(LAST)
+    first = 0
     if found is not None:
-        for known, expected in zip(found[1], frames_until(first - 1), strict=True):
-            assert len(known) == len(expected)
-            assert all(
-                np.array_equal(one, other) for one, other in zip(known, expected, strict=True)
-            )
+        number, state, frames, metrics = found
+        assert state.steps == number and same((frames, metrics), frames_until(number))
+        first = number + 1
     for last in saves:
         if last >= first:
-            checkpoint.save(Counted(np.int32(last)), *(part[: last + 1] for part in frames))
+            checkpoint.save(Counted(np.int32(last)), *frames_until(last))
     return first
 
 
@@ -71,12 +84,12 @@ def test_the_newest_state_comes_back_with_all_its_frames(folder, capsys):
 
 def test_a_frame_is_saved_once(tmp_path):
     checkpoint = MotionCheckpoint(tmp_path, "a")
-    frames = [list(part) for part in frames_until(40)]
-    noise = np.random.default_rng(0)
-    frames[0] = [noise.normal(size=(1000, 3)) for _ in frames[0]]  # does not compress
+    frames, metrics = frames_until(40)
+    noise = np.random.default_rng(0)  # does not compress
+    frames = [replace(frame, position=noise.normal(size=(1000, 3))) for frame in frames]
     sizes = []
     for last in (9, 19, 29, 39):
-        checkpoint.save(Counted(np.int32(last)), *(part[: last + 1] for part in frames))
+        checkpoint.save(Counted(np.int32(last)), frames[: last + 1], metrics[: last + 1])
         sizes.append(size(tmp_path / "frames" / str(last)))
     assert pieces(tmp_path) == [9, 19, 29, 39]
     assert max(sizes) < 1.05 * min(sizes) and min(sizes) > 9 * 1000 * 3 * 8
