@@ -65,7 +65,9 @@ def main() -> None:
             height=options.height,
         )
         thing = model_gaussians(OBJECTS[material], options.splats, options.seed)
-        out = animate(scene, options.out / material, objects=(thing,), progress=True)
+        out = animate(
+            scene, options.out / material, objects=(thing,), overwrite=True, progress=True
+        )
         if options.sheets:
             options.sheets.mkdir(parents=True, exist_ok=True)
             shutil.copy(out / "contact_sheet.png", options.sheets / f"{material}.png")
