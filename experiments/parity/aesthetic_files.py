@@ -7,11 +7,10 @@ from pathlib import Path
 
 import torch
 
+from experiments.parity.arrays import weights
+from experiments.parity.clip import DeepHead
+from experiments.parity.clip_cases import LINEAR_HEAD
 from jaxphys.evaluate.aesthetic import HEADS
-
-from .arrays import weights
-from .clip import DeepHead
-from .clip_cases import LINEAR_HEAD
 
 FOLDER = Path(__file__).parents[2] / "tests" / "evaluate" / "golden"
 NARROW = (768, 4, 3, 3, 2, 1)

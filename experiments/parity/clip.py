@@ -11,10 +11,10 @@ import torch
 from transformers import CLIPConfig, CLIPModel, CLIPTextConfig, CLIPTextModel, CLIPTokenizer
 from transformers.models.clip.image_processing_pil_clip import CLIPImageProcessorPil
 
-from . import clip_cases as cases
-from .arrays import weights
-from .clip_tokenizer import GOLDEN as VOCABULARY
-from .clip_tokenizer import STYLES, write_folder
+from experiments.parity import clip_cases as cases
+from experiments.parity.arrays import weights
+from experiments.parity.clip_tokenizer import GOLDEN as VOCABULARY
+from experiments.parity.clip_tokenizer import STYLES, write_folder
 
 PREFIX = "text_model."
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .arrays import pseudo_random
+from experiments.parity.arrays import pseudo_random
 
 # Texts as Stable Diffusion 1.5 reads them: the end mark is the largest id and the padding.
 END_PADDED = {

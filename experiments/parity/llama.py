@@ -6,8 +6,8 @@ import numpy as np
 import torch
 from transformers import LlamaConfig, LlamaForCausalLM
 
-from .arrays import weights
-from .llama_cases import CASES, IDS, READ, SMOLLM2
+from experiments.parity.arrays import weights
+from experiments.parity.llama_cases import CASES, IDS, READ, SMOLLM2
 
 
 def names(config: dict) -> dict[str, tuple[int, ...]]:

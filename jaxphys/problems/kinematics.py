@@ -1,4 +1,4 @@
-"""What follows from a motion alone: velocity, gradients, and the momentum it does not balance.
+"""What follows from a motion alone: velocity, gradient, and the momentum it does not balance.
 
 A motion is a function `motion(X (3,), t) -> x (3,)` [m] of one material point. Everything else here
 comes from it by differentiation, so that a closed-form body force is checked rather than trusted.
@@ -31,12 +31,6 @@ def acceleration(motion: Motion, X: Array, t: Array) -> Array:
 def deformation_gradient(motion: Motion, X: Array, t: Array) -> Array:
     """F = dx/dX, shape (3, 3)."""
     return jax.jacfwd(motion)(X, t)
-
-
-def velocity_gradient(motion: Motion, X: Array, t: Array) -> Array:
-    """Spatial velocity gradient (dF/dt) F^-1 [1/s], shape (3, 3)."""
-    rate = jax.jacfwd(lambda point: velocity(motion, point, t))(X)
-    return rate @ jnp.linalg.inv(deformation_gradient(motion, X, t))
 
 
 def divergence(motion: Motion, stress: Stress, X: Array, t: Array) -> Array:

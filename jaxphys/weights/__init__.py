@@ -61,12 +61,6 @@ def load(name: str, folder: Path = FOLDER) -> tuple[dict[str, np.ndarray], dict]
     return parse(content), entry
 
 
-@cache
-def load_cached(name: str) -> tuple[dict[str, np.ndarray], dict]:
-    """As `load` from the package's own folder, read once a process; do not modify the arrays."""
-    return load(name)
-
-
 def register(name: str, source: str | Path, folder: Path = FOLDER, **facts) -> dict:
     """Copies the safetensors file `source` into the package and lists it in the manifest.
 
