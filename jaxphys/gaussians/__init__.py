@@ -12,7 +12,6 @@ from .density import lower_opacity as lower_opacity
 from .density import with_capacity as with_capacity
 from .filling import FillingConfig as FillingConfig
 from .filling import fill_interior as fill_interior
-from .filling import particle_volumes as particle_volumes
 from .gaussians import Gaussians as Gaussians
 from .gaussians import axes as axes
 from .gaussians import concatenate as concatenate

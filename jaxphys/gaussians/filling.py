@@ -2,23 +2,31 @@
 
 Reconstructed and meshed objects are shells of Gaussians. The opacity field on a grid tells the
 shell from the rest: cells that are dense enough are solid, and empty cells that see solid ones all
-around are inside. Every such cell gets its particles.
+around are inside. In solid cells the body ends at the surface through the Gaussians' centres.
 
-Three things differ from PhysGaussian's code: a Gaussian's reach is bounded, so that an enormous one
+What differs from PhysGaussian's code: a Gaussian's reach is bounded, so that an enormous one
 cannot stall the search; a Gaussian flatter than a cell counts with half a cell of thickness, so
-that thin shells do not slip between grid nodes; and both searches run over the whole grid at once.
+that thin shells do not slip between grid nodes; both searches run over the whole grid at once; no
+particle is put outside the skin (theirs fill solid cells whole); and the particles are a jittered
+lattice instead of random.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
+from scipy.spatial import cKDTree
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.rotations import quaternion_to_matrix
 from jaxphys.gaussians.gaussians import Gaussians, opacities, require_finite, scales
+from jaxphys.gaussians.hull import enclosed
+from jaxphys.gaussians.volumes import body_volumes, cell_volumes, thinned
 
 _MARGIN = 2
+_JITTER = 0.25
 _CHUNK = 1 << 21
 
 
@@ -28,13 +36,14 @@ class FillingConfig:
 
     Attributes:
         spacing: side of a cell [m].
-        density_threshold: summed opacity above which a cell is solid and topped up; None: a quarter
-            of the median over the cells that hold Gaussians, which suits sparse and dense shells.
+        density_threshold: summed opacity above which a cell is solid, so that the skin is in or
+            beside it; None: a quarter of the median over the cells that hold Gaussians, which suits
+            sparse and dense shells.
         search_threshold: density that a ray must meet to have hit something; None: as above.
         search_count: how many of the directions searched must hit; at most all of them.
         exclude_direction: the one that is not searched, for objects open on that side.
         ray_direction: along it the number of solid runs crossed must be odd as well.
-        per_cell: particles in every solid or inner cell, those of Gaussians counted.
+        per_cell: particles for every cell's volume inside.
         maximum: most particles to add.
         area: (x0, x1, y0, y1, z0, z1) [m], the part to fill; None: all.
         smooth: blur the density by one cell first, which closes small holes.
@@ -55,6 +64,11 @@ class FillingConfig:
     reach: int = 6
     maximum_cells: int = 1 << 26
 
+    @property
+    def pitch(self) -> float:
+        """Distance between the particles that are added [m]."""
+        return self.spacing / self.per_cell ** (1 / 3)
+
 
 def _grid(points: np.ndarray, config: FillingConfig) -> tuple[np.ndarray, tuple[int, int, int]]:
     """Origin and shape of the grid that holds the points and a margin."""
@@ -64,7 +78,7 @@ def _grid(points: np.ndarray, config: FillingConfig) -> tuple[np.ndarray, tuple[
         low, high = np.maximum(low, area[0::2]), np.minimum(high, area[1::2])
         if np.any(low > high):
             raise InputError("filling: the area holds no Gaussians; widen it")
-    cells = np.floor((high - low) / config.spacing) + 1 + 2 * _MARGIN
+    cells = np.ceil((high - low) / config.spacing - 1e-4) + 2 * _MARGIN
     if np.prod(cells) > config.maximum_cells:
         longest = (high - low).max()
         raise InputError(
@@ -72,7 +86,8 @@ def _grid(points: np.ndarray, config: FillingConfig) -> tuple[np.ndarray, tuple[
             f"{longest:.3g} m, more than {config.maximum_cells:.2g}; make it coarser, or leave "
             f"out Gaussians far away"
         )
-    return low - _MARGIN * config.spacing, tuple(int(n) for n in cells)
+    # About the middle: a symmetric object gets a symmetric grid.
+    return (low + high - cells * config.spacing) / 2, tuple(int(n) for n in cells)
 
 
 def _cells(points: np.ndarray, origin: np.ndarray, spacing: float) -> np.ndarray:
@@ -157,11 +172,44 @@ def inner_cells(density: np.ndarray, config: FillingConfig) -> np.ndarray:
     return inside
 
 
-def fill_interior(gaussians: Gaussians, config: FillingConfig, seed: int = 0) -> np.ndarray:
-    """Points (M, 3) [m] to add to the Gaussians' centres, in the dtype of the means.
+def _lattice(origin: np.ndarray, shape: tuple[int, int, int], config: FillingConfig) -> np.ndarray:
+    """Middles (L, 3) [m] of cubes as wide as the filling's pitch, all over the grid."""
+    extent = np.array(shape) * config.spacing
+    count = np.floor(extent / config.pitch + 1e-6).astype(int)
+    index = np.stack(np.meshgrid(*map(np.arange, count), indexing="ij"), axis=-1).reshape(-1, 3)
+    return origin + config.pitch * (index + 0.5) + 0.5 * (extent - count * config.pitch)
 
-    Cells that are solid or inside are topped up to `per_cell` points, uniformly at random; the same
-    seed gives the same points.
+
+class Filled(NamedTuple):
+    """What fills a body, and how much of it each particle stands for.
+
+    Attributes:
+        points: added (M, 3) [m].
+        volumes: of the Gaussians and of the points [m^3], (N + M,).
+    """
+
+    points: np.ndarray
+    volumes: np.ndarray
+
+
+def fill(
+    gaussians: Gaussians,
+    config: FillingConfig,
+    seed: int = 0,
+    *,
+    spread: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> Filled:
+    """Fills the body whose skin the Gaussians' centres are.
+
+    Inside are the empty cells that see solid ones all around, by `config`, and what lies between
+    them and the skin (`hull.enclosed`). It is filled by a jittered lattice, which keeps half a
+    pitch away from the Gaussians. Particles, volumes and their sum move with the object.
+
+    Args:
+        gaussians: the skin; there may be more inside.
+        config: what is inside.
+        seed: the same gives the same points.
+        spread: moves the points (M, 3), for instance apart, before their volumes are measured.
 
     Raises:
         InputError: a Gaussian is not finite, the grid is too large, there would be more than
@@ -171,51 +219,54 @@ def fill_interior(gaussians: Gaussians, config: FillingConfig, seed: int = 0) ->
         raise InputError("filling: spacing, per_cell and reach must be positive")
     require_finite(gaussians, "filling")
     means = np.asarray(gaussians.means, np.float64)
-    if not len(means):
-        return np.zeros((0, 3), gaussians.means.dtype)
+    none = np.zeros((0, 3))
+    if len(means) < 5:
+        return Filled(none, cell_volumes(means, config.spacing))
     origin, shape = _grid(means, config)
     density = density_field(gaussians, origin, shape, config)
     if config.smooth:
         density = gaussian_filter(density, 1.0)
-    present = _cells(means, origin, config.spacing)
-    present = present[np.all((present >= 0) & (present < shape), axis=1)]
     if config.density_threshold is None:
+        present = _cells(means, origin, config.spacing)
+        present = present[np.all((present >= 0) & (present < shape), axis=1)]
         own = density[tuple(present.T)]
         config = replace(config, density_threshold=0.25 * float(np.median(own)))
-    wanted = (density > config.density_threshold) | inner_cells(density, config)
-    count = np.zeros(shape, np.int64)
-    np.add.at(count, tuple(present.T), 1)
-    missing = np.where(wanted, np.maximum(config.per_cell - count, 0), 0)
-    total = int(missing.sum())
-    if total > config.maximum:
-        raise InputError(
-            f"filling: {total} particles, more than the maximum of {config.maximum}; make the "
-            f"spacing coarser, lower per_cell, or raise the maximum"
-        )
-    index = np.repeat(np.argwhere(missing > 0), missing[missing > 0], axis=0)
-    points = origin + config.spacing * (index + np.random.default_rng(seed).random((total, 3)))
+    inner = inner_cells(density, config)
+    middles = _lattice(origin, shape, config)
+    # Moved by up to a quarter of a pitch along each axis: at least half a pitch apart, which places
+    # drawn at random are not, and in no rows.
+    jitter = np.random.default_rng(seed).uniform(-_JITTER, _JITTER, middles.shape)
+    places = middles + config.pitch * jitter
+    cell = tuple(np.minimum(_cells(places, origin, config.spacing), np.array(shape) - 1).T)
+    within = inner[cell]
+    if within.sum() > config.maximum:
+        raise _too_many(int(within.sum()), config)
+    # Between the two lies the skin; what is far from it on either side is known.
+    solid = density > config.density_threshold
+    without = places[~solid[cell] & ~within]
+    first, _ = thinned(means, config.pitch / 4)
+    body = enclosed(means[first], places[within], without)
+    unsure = np.flatnonzero(solid[cell] & ~within)
+    within[unsure] = body.contains(places[unsure])
+    points = places[within]
+    points = points[cKDTree(means).query(points)[0] > config.pitch / 2]
     if config.area is not None:
         area = np.asarray(config.area)
         points = points[np.all((points > area[0::2]) & (points < area[1::2]), axis=1)]
-    return points.astype(gaussians.means.dtype)
+    if len(points) > config.maximum:
+        raise _too_many(len(points), config)
+    if spread is not None and len(points):
+        points = spread(points)
+    return Filled(points, body_volumes(means, points, config.pitch, body, middles))
 
 
-def particle_volumes(points: np.ndarray, spacing: float) -> np.ndarray:
-    """Volume of each particle [m^3], shape (N,), from points (N, 3) [m].
+def _too_many(count: int, config: FillingConfig) -> InputError:
+    return InputError(
+        f"filling: {count} particles, more than the maximum of {config.maximum}; make the "
+        f"spacing coarser, lower per_cell, or raise the maximum"
+    )
 
-    The particles of a cell share it (as in PhysGaussian), averaged over eight grids shifted by half
-    a cell: on one grid a surface cell that is mostly empty counts whole. Each particle takes, of
-    its eight cells' shares, the harmonic mean, which is what counting neighbours in a tent-shaped
-    window around it gives. With 8 to 27 random particles a cell the sum is within 12 % of the
-    volume of a ball or a cube some ten cells wide (tests/gaussians/test_filling.py).
-    """
-    points = np.asarray(points, np.float64)
-    crowd = np.zeros(len(points))
-    if not len(points):
-        return crowd
-    low = points.min(axis=0)
-    for shift in np.ndindex(2, 2, 2):
-        cell = np.floor((points - low) / spacing + 0.5 * np.array(shift)).astype(np.int64)
-        _, inverse, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
-        crowd += count[inverse.reshape(-1)] / 8
-    return spacing**3 / crowd
+
+def fill_interior(gaussians: Gaussians, config: FillingConfig, seed: int = 0) -> np.ndarray:
+    """Points (M, 3) [m] to add to the Gaussians' centres, in the dtype of the means; see `fill`."""
+    return fill(gaussians, config, seed).points.astype(gaussians.means.dtype)

@@ -11,7 +11,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxphys.core.errors import InputError
-from jaxphys.gaussians.filling import particle_volumes
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.mpm.boundaries import Damping, Setting, prepare
 from jaxphys.mpm.grid import Grid
@@ -122,7 +121,7 @@ def particles_of(placed: Placed, thing: Object, grid: Grid) -> Particles:
             values[name] = np.where(inside, value, values[name])
     return Particles(
         positions=positions,
-        volumes=particle_volumes(positions, grid.spacing),
+        volumes=placed.volumes,
         velocities=np.asarray(thing.velocity) + arms @ gradient.T,
         velocity_gradients=np.broadcast_to(gradient, (len(positions), 3, 3)),
         values=values,

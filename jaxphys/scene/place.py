@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.rotations import axis_angle_to_matrix
-from jaxphys.gaussians.filling import FillingConfig, fill_interior
+from jaxphys.gaussians.filling import Filled, FillingConfig, fill
 from jaxphys.gaussians.gaussians import (
     Gaussians,
     concatenate,
@@ -19,26 +19,38 @@ from jaxphys.gaussians.gaussians import (
     transform,
 )
 from jaxphys.gaussians.harmonics import dc_to_rgb
+from jaxphys.gaussians.hull import surface_spacing
+from jaxphys.gaussians.lone import lone_points
 from jaxphys.gaussians.relax import blue_noise
+from jaxphys.gaussians.volumes import cell_volumes
 from jaxphys.mpm.grid import Grid
 from jaxphys.scene.scene import Object
 
 RELAX_STEPS = 40
 SIZE_OVER_SPACING = 0.4
+# A splat of opacity 0.95 is fainter than 1/255 from so many of its standard deviations on.
+VISIBLE = 3.3
+# Splats farther apart than this many times the usual distance, and than a cell of the grid, do not
+# hold together: the solver lets go of them at the first knock.
+LINK = 2.0
 
 
 class Placed(NamedTuple):
     """An object in the domain.
 
     Attributes:
-        moving: Gaussians that follow particles.
+        moving: K Gaussians that follow particles.
         still: Gaussians outside the object's `area`, drawn where they are.
         filling: further particles inside, (M, 3) [m].
+        volumes: of the particles [m^3], (K + M,), those of Gaussians first.
+        lone: number of splats beside the object that were left out.
     """
 
     moving: Gaussians
     still: Gaussians
     filling: np.ndarray
+    volumes: np.ndarray
+    lone: int
 
 
 def rotation_matrix(thing: Object, where: str) -> np.ndarray:
@@ -54,7 +66,17 @@ def rotation_matrix(thing: Object, where: str) -> np.ndarray:
 
 
 def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str, seed: int) -> Placed:
-    """The Gaussians of an object in the domain, and its filling; `seed` is for the latter.
+    """The Gaussians of an object in the domain, its filling and its volumes.
+
+    All but the last shift happens about the object's own middle, so that it is filled and weighs
+    the same at every place.
+
+    Args:
+        gaussians: in the units of their file.
+        thing: what is asked for.
+        grid: of the solver.
+        where: the object's name in messages.
+        seed: of the filling.
 
     Raises:
         InputError: nothing is opaque enough or inside `area`, or the object sticks out of the
@@ -77,26 +99,71 @@ def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str, seed: int
                 f"{where}.area: holds none of the {len(means)} Gaussians, which lie between "
                 f"{_numbers(means.min(0))} and {_numbers(means.max(0))}"
             )
-    low, high = means[chosen].min(0), means[chosen].max(0)
-    extent = (high - low).max()
-    scale = thing.size / extent if extent > 0 else 1.0
-    shift = np.array(thing.centre) - scale * (low + high) / 2
-    placed = transform(gaussians, scale=scale, translation=shift)
-    moving = select(placed, np.flatnonzero(chosen))
-    _require_inside(np.asarray(moving.means), grid, where)
-    still = select(placed, np.flatnonzero(~chosen))
-    filling = _fill(moving, thing, grid, seed, where)
+    kept = chosen.copy()
+    kept[chosen] = ~_lone(means[chosen], thing.size, grid)
+    middle, scale = _frame(means[kept], thing.size)
+    own = transform(gaussians, scale=scale, translation=-scale * middle)
+    moving, still = (select(own, np.flatnonzero(which)) for which in (kept, ~chosen))
+    centre = np.array(thing.centre)
+    _require_inside(np.asarray(moving.means) + centre, grid, where)
+    filled = _fill(moving, thing, grid, seed, where)
+    filling, volumes = filled.points, filled.volumes
     if thing.filling is not None and thing.filling.show and len(filling):
         moving, filling = concatenate([moving, _shown(filling, moving, thing, grid)]), filling[:0]
-    return Placed(moving, still, filling)
+    moving, still = (transform(part, translation=centre) for part in (moving, still))
+    filling = (filling + centre).astype(moving.means.dtype)
+    return Placed(moving, still, filling, volumes, int(np.sum(chosen & ~kept)))
+
+
+def _frame(means: np.ndarray, size: float) -> tuple[np.ndarray, float]:
+    """Middle of the bounding box of `means`, and the factor that makes its longest side `size`."""
+    low, high = means.min(0), means.max(0)
+    extent = (high - low).max()
+    return (low + high) / 2, size / extent if extent > 0 else 1.0
+
+
+def _lone(means: np.ndarray, size: float, grid: Grid) -> np.ndarray:
+    """Which of `means` (N, 3) hang beside the object and would come off, a mask (N,)."""
+    _, scale = _frame(means, size)
+    return lone_points(
+        means, max(LINK * float(np.median(surface_spacing(means))), grid.spacing / scale)
+    )
+
+
+def _config(thing: Object, grid: Grid) -> FillingConfig:
+    """How an object is filled, in a frame about its middle."""
+    filling = thing.filling
+    area = filling.area
+    if area is not None:
+        area = tuple(np.asarray(area) - np.repeat(thing.centre, 2))
+    return FillingConfig(
+        spacing=filling.spacing or grid.spacing / 2,
+        density_threshold=filling.density_threshold,
+        search_threshold=filling.search_threshold,
+        search_count=filling.search_count,
+        exclude_direction=filling.exclude_direction,
+        ray_direction=filling.ray_direction,
+        per_cell=filling.per_cell,
+        maximum=filling.maximum,
+        area=area,
+        smooth=filling.smooth,
+    )
 
 
 def _shown(points: np.ndarray, moving: Gaussians, thing: Object, grid: Grid) -> Gaussians:
-    """Round Gaussians at the filling's points, in the colours of those nearest to them."""
-    _, nearest = cKDTree(np.asarray(moving.means)).query(points)
+    """Round Gaussians at the filling's points, in the colours of those nearest to them.
+
+    None reaches through the skin, so that the object looks the same until it comes apart.
+    """
+    skin = np.asarray(moving.means, np.float64)
+    distance, nearest = cKDTree(skin).query(points)
+    # Between the splats the skin is nearer than they are.
+    gap = 0.6 * surface_spacing(skin)[nearest]
+    depth = np.sqrt(np.maximum(distance**2 - gap**2, 0))
     colours = np.asarray(dc_to_rgb(moving.harmonics[:, 0]))[nearest]
-    spacing = (thing.filling.spacing or grid.spacing / 2) / thing.filling.per_cell ** (1 / 3)
-    return from_points(points, colours, SIZE_OVER_SPACING * spacing)
+    usual = SIZE_OVER_SPACING * _config(thing, grid).pitch
+    sizes = np.clip(depth / VISIBLE, 0.05 * usual, usual)
+    return from_points(points.astype(moving.means.dtype), colours, sizes)
 
 
 def _numbers(values) -> str:
@@ -115,29 +182,21 @@ def _require_inside(points: np.ndarray, grid: Grid, where: str) -> None:
         )
 
 
-def _fill(moving: Gaussians, thing: Object, grid: Grid, seed: int, where: str) -> np.ndarray:
-    """Further particles inside an object (M, 3) [m], none where it stays hollow."""
-    filling = thing.filling
-    if filling is None:
-        return np.zeros((0, 3), np.float32)
-    config = FillingConfig(
-        spacing=filling.spacing or grid.spacing / 2,
-        density_threshold=filling.density_threshold,
-        search_threshold=filling.search_threshold,
-        search_count=filling.search_count,
-        exclude_direction=filling.exclude_direction,
-        ray_direction=filling.ray_direction,
-        per_cell=filling.per_cell,
-        maximum=filling.maximum,
-        area=filling.area,
-        smooth=filling.smooth,
-    )
+def _fill(moving: Gaussians, thing: Object, grid: Grid, seed: int, where: str) -> Filled:
+    """What is inside an object, nothing where it stays hollow, and all volumes."""
+    if thing.filling is None:
+        points = np.asarray(moving.means, np.float64)
+        return Filled(np.zeros((0, 3)), cell_volumes(points, grid.spacing / 2))
+    config = _config(thing, grid)
+    spread = None
+    if thing.filling.relax:
+
+        def spread(points: np.ndarray) -> np.ndarray:
+            return blue_noise(
+                points, config.pitch, fixed=np.asarray(moving.means), steps=RELAX_STEPS
+            )
+
     try:
-        points = fill_interior(moving, config, seed)
+        return fill(moving, config, seed, spread=spread)
     except InputError as error:
         raise InputError(f"{where}.filling: {error}") from None
-    if filling.relax and len(points):
-        diameter = config.spacing / filling.per_cell ** (1 / 3)
-        points = blue_noise(points, diameter, fixed=np.asarray(moving.means), steps=RELAX_STEPS)
-    low, high = grid.lower, np.array(grid.upper)
-    return points[np.all((points > low) & (points < high), axis=1)]

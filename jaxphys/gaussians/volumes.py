@@ -1,0 +1,146 @@
+"""How much of a body each particle stands for.
+
+Two kinds of particles, told apart by who calls: those on the skin of a body that is filled, half of
+whose surroundings is outside (`body_volumes`), and those that are all there is, each in the middle
+of its own piece (`cell_volumes`). Neither knows the solver's grid: the mass of a body is the same
+at every place, turn and spacing.
+"""
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
+
+from jaxphys.gaussians.hull import Body, surface_spacing
+
+# Points of the skin closer together than this many pitches of the filling are one corner of a
+# tetrahedron, and those within the other share what is between them evenly.
+_MERGED = 0.25
+_EVEN = 0.75
+# Farther than this from the skin, in pitches, no cube of a particle is cut by it.
+_DEEP = 2.0
+# Least volume of a particle, of the cube as wide as the distance to its neighbours: what a leaf or
+# a thread outside the body has, a layer a tenth as thick as its splats are apart.
+_LAYER = 0.1
+# Radius in spacings that lets the outer layer of a lattice reach half a spacing out, on average
+# over its dips: mean of sqrt(r^2 - x^2 - y^2) over |x|, |y| < 1/2 is 1/2.
+_REACH = 0.65
+# A gap within so many spacings of a particle counts if the middle of the eight particles around it
+# is within the other: it lies among them, not beside them.
+_GAP, _AMONG, _AROUND = 1.2, 0.6, 8
+_SAMPLES = 3  # a spacing and axis
+
+
+def thinned(points: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of one point in every cell of side `pitch`, and for each point its cell's place."""
+    cell = np.floor((points - points.min(axis=0)) / pitch).astype(np.int64)
+    _, first, group = np.unique(cell, axis=0, return_index=True, return_inverse=True)
+    return first, group.reshape(-1)
+
+
+def _evened(volume: np.ndarray, points: np.ndarray, radius: float) -> np.ndarray:
+    """Volumes (N,) shared evenly within `radius` [m]; the sum stays."""
+    pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
+    own = np.arange(len(points))
+    start = np.concatenate([own, pairs[:, 0], pairs[:, 1]])
+    end = np.concatenate([own, pairs[:, 1], pairs[:, 0]])
+    size = len(points)
+    given = volume / np.bincount(start, minlength=size)
+    return csr_matrix((np.ones(len(start)), (start, end)), (size, size)).T @ given
+
+
+def body_volumes(
+    skin: np.ndarray,
+    inner: np.ndarray,
+    pitch: float,
+    body: Body,
+    cells: np.ndarray,
+) -> np.ndarray:
+    """Volume of each particle of a filled body [m^3], (S + I,); the sum is that of the body.
+
+    Args:
+        skin: particles on its surface (S, 3) [m].
+        inner: particles inside (I, 3) [m], one to a cube of side `pitch`, none within half a pitch
+            of the skin.
+        pitch: [m].
+        body: what the skin encloses.
+        cells: middles of cubes of side `pitch` that cover the body's surface (C, 3) [m].
+
+    Deep inside each particle has its cube. Near the skin it has what is nearest to it, and what is
+    nearest to the skin is shared evenly over three quarters of a pitch, so that a share does not
+    depend on which splat happens to lie deepest.
+    """
+    tree = cKDTree(skin)
+    near = tree.query(inner)[0] < _DEEP * pitch
+    volume = np.where(near, 0, pitch**3)
+    cells = cells[tree.query(cells)[0] < _DEEP * pitch]
+    ticks = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES - 0.5) * pitch
+    within = np.stack(np.meshgrid(*[ticks] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    places = (cells + within).reshape(-1, 3)
+    places = places[body.contains(places)]
+    first, group = thinned(skin, _MERGED * pitch)
+    corners = skin[first]
+    owner = cKDTree(np.concatenate([corners, inner[near]])).query(places)[1]
+    count = np.bincount(owner, minlength=len(corners) + near.sum()) * (pitch / _SAMPLES) ** 3
+    shares = _evened(count[: len(corners)], corners, _EVEN * pitch)
+    volume[near] = count[len(corners) :]
+    volume = np.concatenate([(shares / np.bincount(group))[group], volume])
+    # What the samples missed of the surface, shared in proportion.
+    deep = pitch**3 * np.sum(~near)
+    if body.total > deep:
+        some = np.concatenate([np.ones(len(skin), bool), near])
+        volume[some] *= (body.total - deep) / volume[some].sum()
+    width = np.concatenate([surface_spacing(skin), np.full(len(inner), pitch)])
+    return np.maximum(volume, _LAYER * np.minimum(width, pitch) ** 3)
+
+
+def _cell_width(tree: cKDTree) -> np.ndarray:
+    """Side of the cell of each particle [m], (N,): the distance to its fourth neighbour.
+
+    That is the spacing in lattices and in sheets but at corners, which take the median of their
+    neighbours', and for random particles the cube root of the volume that each has. Along a thread
+    it is bounded by one and a half times the second's.
+    """
+    distance, around = tree.query(tree.data, k=5)
+    width = np.minimum(distance[:, 4], 1.5 * distance[:, 2])
+    return np.median(width[around], axis=1)
+
+
+def _samples(points: np.ndarray, width: float) -> np.ndarray:
+    """Places (Q, 3), 27 to a cell of that width, in all cells with a particle in or beside them."""
+    low = points.min(axis=0) - width / 2
+    held = np.unique(np.floor((points - low) / width).astype(np.int64), axis=0)
+    beside = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    cells = np.unique((held + beside).reshape(-1, 3), axis=0)
+    ticks = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    within = np.stack(np.meshgrid(*[ticks] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
+    return (low + width * (cells + within)).reshape(-1, 3)
+
+
+def cell_volumes(points: np.ndarray, single: float) -> np.ndarray:
+    """Volume of particles that are all there is of a thing [m^3], (N,), from (N, 3) [m].
+
+    Each owns what is nearest to it within 0.65 of the distance to its neighbours, and the gaps
+    among them: spacing^3 in a lattice, to its corners, and in a sheet one particle thick.
+
+    Args:
+        points: (N, 3) [m].
+        single: width of a particle with fewer than four others [m].
+    """
+    points = np.asarray(points, np.float64)
+    if len(points) < 5:
+        return np.full(len(points), single**3)
+    tree = cKDTree(points)
+    width = _cell_width(tree)
+    typical = float(np.median(width))
+    places = _samples(points, typical)
+    distance, owner = tree.query(places)
+    distance = distance / width[owner]
+    owned = distance < _REACH
+    gaps = np.flatnonzero(~owned & (distance < _GAP))
+    if len(gaps) and len(points) >= _AROUND:
+        middle = points[tree.query(places[gaps], k=_AROUND)[1]].mean(axis=1)
+        offset = np.linalg.norm(middle - places[gaps], axis=1) / width[owner[gaps]]
+        owned[gaps] = offset < _AMONG
+    volume = np.bincount(owner[owned], minlength=len(points)) * (typical / _SAMPLES) ** 3
+    # Particles closer together than the samples share what the nearest sample gave.
+    return np.maximum(volume, (typical / _SAMPLES) ** 3)
