@@ -54,12 +54,11 @@ def surface_spacing(skin: np.ndarray) -> np.ndarray:
     return cKDTree(skin).query(skin, k=[count])[0][:, 0]
 
 
-def _clear(skin: np.ndarray, spacing: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Those of `points` farther from the skin than it has gaps, and sparser deep down."""
-    distance, nearest = cKDTree(skin).query(points)
-    far = distance > 4 * max(np.median(spacing), np.median(distance) / 2)
+def _known(skin: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
+    """Those of `points` farther from the skin than its gaps, a quarter of them deep down."""
+    distance = cKDTree(skin).query(points)[0]
     some = np.arange(len(points)) % 4 == 0
-    return points[(distance > spacing[nearest]) & (~far | some)]
+    return points[(distance > reach) & (some | (distance < 3 * reach))]
 
 
 def _circumradius(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
@@ -77,13 +76,12 @@ def enclosed(skin: np.ndarray, within: np.ndarray, without: np.ndarray) -> Body:
         within: points (I, 3) [m] known to be inside.
         without: points (O, 3) [m] known to be outside, at least all around.
 
-    Places closer to the skin than its points are to each other are not taken as known: they would
-    come through its gaps.
+    Places within `reach` of the skin are not taken as known, for they would come through its gaps.
     """
     spacing = surface_spacing(skin)
-    within, without = (_clear(skin, spacing, places) for places in (within, without))
-    points = np.concatenate([skin, within, without])
     reach = _GAP * np.quantile(spacing, 0.9)
+    within, without = (_known(skin, reach, places) for places in (within, without))
+    points = np.concatenate([skin, within, without])
     noise = np.random.default_rng(0).uniform(-1, 1, points.shape)
     points = points + _JIGGLE * np.median(spacing) * noise
     mesh = Delaunay(points)

@@ -18,6 +18,7 @@ _MERGED = 0.25
 _EVEN = 0.75
 # Farther than this from the skin, in pitches, no cube of a particle is cut by it.
 _DEEP = 2.0
+_MOST = 1.5
 # Least volume of a particle, of the cube as wide as the distance to its neighbours: what a leaf or
 # a thread outside the body has, a layer a tenth as thick as its splats are apart.
 _LAYER = 0.1
@@ -37,15 +38,20 @@ def thinned(points: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
     return first, group.reshape(-1)
 
 
-def _evened(volume: np.ndarray, points: np.ndarray, radius: float) -> np.ndarray:
-    """Volumes (N,) shared evenly within `radius` [m]; the sum stays."""
+def _evened(
+    volume: np.ndarray, members: np.ndarray, points: np.ndarray, radius: float
+) -> np.ndarray:
+    """What each member of each place gets if the volumes (P,) are shared evenly within `radius`.
+
+    The sum over `members` (P,), a count at each of `points` (P, 3), is that of the volumes.
+    """
     pairs = cKDTree(points).query_pairs(radius, output_type="ndarray")
     own = np.arange(len(points))
     start = np.concatenate([own, pairs[:, 0], pairs[:, 1]])
     end = np.concatenate([own, pairs[:, 1], pairs[:, 0]])
     size = len(points)
-    given = volume / np.bincount(start, minlength=size)
-    return csr_matrix((np.ones(len(start)), (start, end)), (size, size)).T @ given
+    near = csr_matrix((np.ones(len(start)), (start, end)), (size, size))
+    return near @ (volume / (near @ members))
 
 
 def body_volumes(
@@ -81,14 +87,14 @@ def body_volumes(
     corners = skin[first]
     owner = cKDTree(np.concatenate([corners, inner[near]])).query(places)[1]
     count = np.bincount(owner, minlength=len(corners) + near.sum()) * (pitch / _SAMPLES) ** 3
-    shares = _evened(count[: len(corners)], corners, _EVEN * pitch)
-    volume[near] = count[len(corners) :]
-    volume = np.concatenate([(shares / np.bincount(group))[group], volume])
-    # What the samples missed of the surface, shared in proportion.
-    deep = pitch**3 * np.sum(~near)
-    if body.total > deep:
-        some = np.concatenate([np.ones(len(skin), bool), near])
-        volume[some] *= (body.total - deep) / volume[some].sum()
+    # An inner one has about its cube; what the samples missed, or gave it beyond, is the skin's.
+    volume[near] = np.clip(count[len(corners) :], pitch**3 / _MOST, pitch**3 * _MOST)
+    members = np.bincount(group).astype(float)
+    shares = _evened(count[: len(corners)], members, corners, _EVEN * pitch)[group]
+    rest = body.total - volume.sum()
+    if rest > 0 and shares.sum() > 0:
+        shares *= rest / shares.sum()
+    volume = np.concatenate([shares, volume])
     width = np.concatenate([surface_spacing(skin), np.full(len(inner), pitch)])
     return np.maximum(volume, _LAYER * np.minimum(width, pitch) ** 3)
 

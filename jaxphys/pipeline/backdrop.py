@@ -1,11 +1,11 @@
 """What stands behind the object: a floor that fades into the background, with a soft shadow.
 
-The floor is a plane seen by each pixel, not made of splats: it costs the same at any distance,
-has no
-seams, and never hides what stands on it.
+The floor is a plane seen by each pixel, not made of splats: it costs the same at any distance, has
+no seams, and never hides what stands on it. Its fading is so slow that steps of one level of 8 bits
+show as rings; half a level of noise breaks them up.
 """
 
-from functools import partial
+from functools import partial, reduce
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +14,7 @@ from jax import Array
 from jaxphys.render.camera import Camera, position
 
 CELLS = 96  # of the shadow map, a side
+CLOSING = 2  # half the width of gaps between points that are closed [cells]
 BLUR = (1.5, 5.0)  # standard deviations of the contact and of the wide shadow [cells]
 
 
@@ -25,12 +26,42 @@ def _blurred(picture: Array, deviation: float) -> Array:
     return kernel @ picture @ kernel.T
 
 
+def _closed(picture: Array) -> Array:
+    """Grey closing of (CELLS, CELLS) by a square: gaps narrower than it take what is around them.
+
+    (Serra 1982): the largest value nearby, then of those the smallest.
+    """
+    for choose, beyond in ((jnp.maximum, 0.0), (jnp.minimum, 1.0)):
+        for axis in (0, 1):
+            width = [(0, 0), (0, 0)]
+            width[axis] = (CLOSING, CLOSING)
+            padded = jnp.pad(picture, width, constant_values=beyond)
+            picture = reduce(
+                choose,
+                [
+                    jax.lax.slice_in_dim(padded, k, k + CELLS, axis=axis)
+                    for k in range(2 * CLOSING + 1)
+                ],
+            )
+    return picture
+
+
+def _noise(width: int, height: int, dtype) -> Array:
+    """Noise in [-1/2, 1/2), (height, width), the same in every frame and unlike in neighbours.
+
+    (Jimenez 2014, interleaved gradient noise.)
+    """
+    x, y = jnp.arange(width, dtype=dtype), jnp.arange(height, dtype=dtype)
+    coarse = (0.06711056 * x[None, :] + 0.00583715 * y[:, None]) % 1
+    return (52.9829189 * coarse) % 1 - 0.5
+
+
 def shadow_map(points: Array, height: float, corner: Array, side: Array) -> Array:
     """How dark the floor is, (CELLS, CELLS) in [0, 1], under points (N, 3) [m].
 
     What touches the floor casts a narrow shadow, what hangs above a wide and faint one, as under
-    an
-    overcast sky.
+    an overcast sky. Cells between points are as dark as the points around them: how densely an
+    object is sampled does not show.
 
     Args:
         points: of the object [m].
@@ -47,7 +78,8 @@ def shadow_map(points: Array, height: float, corner: Array, side: Array) -> Arra
         # Each cell counts the point nearest to the floor; a count would depend on density.
         reach = jnp.exp(-jnp.clip(above, 0, None) / (2.5 * deviation))
         nearest = jnp.zeros(CELLS * CELLS, points.dtype).at[flat].max(reach)
-        darkness = darkness + 0.5 * _blurred(nearest.reshape(CELLS, CELLS), deviation)
+        nearest = _closed(nearest.reshape(CELLS, CELLS))
+        darkness = darkness + 0.5 * _blurred(nearest, deviation)
     return jnp.clip(darkness, 0, 1)
 
 
@@ -108,4 +140,9 @@ def backdrop(
     )
     paper, floor = jnp.array(background, dtype), jnp.array(colour, dtype)
     plain = paper + fade * (floor - paper)
-    return plain * (1 - shadow * jnp.where(seen, dark, 0)[..., None])
+    picture = plain * (1 - shadow * jnp.where(seen, dark, 0)[..., None])
+    # Paper stays as it is: noise begins where the floor differs from it by half a level.
+    level = 1 / 255
+    noise = level * _noise(camera.width, camera.height, dtype)[..., None]
+    differs = jnp.max(jnp.abs(picture - paper), axis=-1, keepdims=True) > level / 2
+    return picture + jnp.where(differs, noise, 0)

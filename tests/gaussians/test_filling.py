@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from jaxphys.core.errors import InputError
-from jaxphys.gaussians.filling import FillingConfig, fill_interior, inner_cells, particle_volumes
+from jaxphys.gaussians.filling import FillingConfig, fill_interior, inner_cells
 from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.gaussians.relax import blue_noise
 from jaxphys.gaussians.surface import facing
@@ -34,7 +34,7 @@ def shell(count=2500, opening=2.0, size=0.05):
 def test_a_hollow_ball_is_filled(ray):
     points = fill_interior(shell(), dataclasses.replace(CONFIG, ray_direction=ray), seed=1)
     radius = np.linalg.norm(points, axis=1)
-    assert radius.max() < 1.2
+    assert radius.max() < 1.0
     inner = np.sum(radius < 0.8)
     np.testing.assert_allclose(inner, 4 / 3 * np.pi * 0.8**3 / 0.1**3, rtol=0.05)
     again = fill_interior(shell(), dataclasses.replace(CONFIG, ray_direction=ray), seed=1)
@@ -108,27 +108,6 @@ def test_enormous_degenerate_and_invalid_gaussians():
         fill_interior(nan, CONFIG)
     none = Gaussians(*(jnp.zeros((0, *s)) for s in [(3,), (3,), (4,), (), (1, 3)]))
     assert fill_interior(none, CONFIG).shape == (0, 3)
-
-
-@pytest.mark.parametrize("shape", ["ball", "cube"])
-@pytest.mark.parametrize("per_cell", [8, 27])
-def test_volumes_add_up(shape, per_cell):
-    random = np.random.default_rng(0)
-    points = random.uniform(-1, 1, (40_000, 3))
-    volume = 8.0
-    if shape == "ball":
-        points = points[np.linalg.norm(points, axis=1) < 1]
-        volume = 4 / 3 * np.pi
-    spacing = (volume * per_cell / len(points)) ** (1 / 3)
-    volumes = particle_volumes(points, spacing)
-    assert volumes.shape == (len(points),) and volumes.min() > 0
-    np.testing.assert_allclose(volumes.sum(), volume, rtol=0.12)
-    # One grid, where the cells that the surface cuts count whole, is farther off for the ball.
-    if shape == "ball":
-        cells = len(np.unique(np.floor(points / spacing), axis=0))
-        assert abs(volumes.sum() - volume) < abs(cells * spacing**3 - volume)
-    assert particle_volumes(points[:1], 0.5)[0] == 0.125
-    assert particle_volumes(points[:0], 0.5).shape == (0,)
 
 
 def nearest(points):

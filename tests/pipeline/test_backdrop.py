@@ -2,7 +2,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxphys.pipeline.backdrop import backdrop
+from jaxphys.pipeline.backdrop import CELLS, backdrop, shadow_map
 from jaxphys.render.camera import orbit, to_pixels
 
 LOOK = {"height": 0.0, "colour": (0.5, 0.5, 0.5), "shadow": 0.8, "background": (1.0, 1.0, 1.0)}
@@ -55,3 +55,44 @@ def test_gradient_is_finite_with_a_point_on_the_floor_and_outside():
         return jnp.sum(backdrop(view(), points, MIDDLE, EXTENT, **LOOK))
 
     assert np.isfinite(np.asarray(jax.grad(total)(points))).all()
+
+
+def ball(count, gap, radius=0.45):
+    """Points on a ball (a Fibonacci lattice) whose lowest is `gap` above the floor."""
+    index = np.arange(count) + 0.5
+    z, turn = 1 - 2 * index / count, np.pi * (1 + 5**0.5) * index
+    ring = np.sqrt(1 - z * z)
+    points = radius * np.stack([ring * np.cos(turn), ring * np.sin(turn), z + 1], axis=1)
+    return jnp.asarray(points + np.array([0, 0, gap]), jnp.float32)
+
+
+def profile(count, gap):
+    """Mean darkness of the shadow of a ball at distances of whole cells."""
+    corner, side = jnp.full(2, -1.6, jnp.float32), jnp.float32(3.2)
+    dark = np.asarray(shadow_map(ball(count, gap), 0.0, corner, side))
+    middle = np.arange(CELLS) + 0.5 - CELLS / 2
+    distance = np.hypot(middle[:, None], middle).astype(int)
+    return np.array([dark[distance == k].mean() for k in range(30)])
+
+
+def test_shadow_of_a_ball_falls_off_without_rings_however_densely_it_is_sampled():
+    for gap in (0.0, 0.3):
+        sparse, dense = profile(1500, gap), profile(20_000, gap)
+        assert np.all(np.diff(dense) < 0) and np.all(np.diff(sparse) < 0)
+        assert np.abs(np.diff(dense, 2)).max() < 0.05 * dense[0]  # nor steps
+        np.testing.assert_allclose(sparse, dense, atol=0.05 * dense[0])
+
+
+def test_the_floor_fades_without_bands():
+    smooth = LOOK | {"shadow": 0.0, "colour": (0.9, 0.9, 0.9)}
+    picture = np.asarray(backdrop(view(), above(5.0), MIDDLE, EXTENT, **smooth))[..., 0]
+    levels = np.round(255 * picture.astype(np.float64))
+    # A band is a row of equal pixels; those of the bare floor are a dozen long at this slope.
+    row = levels[50]
+    assert row.min() > 225 and len(np.unique(row)) > 3
+    longest = max(len(run) for run in np.split(row, np.flatnonzero(np.diff(row)) + 1))
+    assert longest < 6
+    # On average it is what was asked for: noise adds nothing.
+    wide = levels[40:60].reshape(4, 5, 12, 8).mean(axis=(1, 3)) / 255
+    means = picture[40:60].reshape(4, 5, 12, 8).mean(axis=(1, 3))
+    np.testing.assert_allclose(wide, means, atol=0.25 / 255)
