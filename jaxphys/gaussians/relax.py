@@ -40,7 +40,8 @@ def blue_noise(
         (M, 3) in the dtype of `points`, each within 0.75 diameters of where it was, by axis.
 
     Raises:
-        InputError: `diameter` or `steps` is not positive, or a point is not finite.
+        InputError: `diameter` or `steps` is not positive, a point is not finite, or jax-md is not
+            installed (the extra `relax`).
     """
     if not diameter > 0 or steps < 1:
         raise InputError("blue noise: diameter and steps must be positive")
@@ -60,7 +61,13 @@ def blue_noise(
 def _relax(everything: np.ndarray, moving: int, diameter: float, steps: int) -> np.ndarray:
     """The first `moving` of the points `everything` (N, 3), relaxed."""
     # jax-md takes seconds to import.
-    from jax_md import energy, minimize, quantity, space
+    try:
+        from jax_md import energy, minimize, quantity, space
+    except ImportError as error:
+        raise InputError(
+            "relaxing a filling needs jax-md: pip install 'jaxphys-splats[relax]'; or leave "
+            "`relax` out, the filling is even without"
+        ) from error
 
     # In diameters, with room to move inside the box of the neighbour search.
     low = everything.min(axis=0) - diameter

@@ -1,4 +1,5 @@
 import dataclasses
+import sys
 
 import jax.numpy as jnp
 import numpy as np
@@ -150,6 +151,12 @@ def test_nothing_to_relax():
         blue_noise(np.zeros((3, 3)), 0.0)
     with pytest.raises(InputError, match="not finite"):
         blue_noise(np.full((3, 3), np.nan), 0.1)
+
+
+def test_relaxing_without_jax_md_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "jax_md", None)
+    with pytest.raises(InputError, match=r"pip install 'jaxphys-splats\[relax\]'"):
+        blue_noise(np.eye(3), 0.1)
 
 
 @pytest.mark.parametrize("count", [900, 6000])
