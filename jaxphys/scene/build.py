@@ -106,7 +106,7 @@ def place_objects(scene: Scene, objects: tuple[Gaussians, ...]) -> tuple[Placed,
     )
 
 
-def particles_of(placed: Placed, thing: Object, grid: Grid) -> Particles:
+def particles_of(placed: Placed, thing: Object) -> Particles:
     """The particles of an object that is in its place."""
     positions = np.concatenate([np.asarray(placed.moving.means), placed.filling])
     x, y, z = np.asarray(thing.spin, np.float64)
@@ -202,9 +202,7 @@ def build(
     dtype = jnp.zeros((), float if dtype is None else dtype).dtype
     placed = place_objects(scene, objects) if placed is None else placed
     grid = solver_grid(scene)
-    parts = [
-        particles_of(one, thing, grid) for one, thing in zip(placed, scene.objects, strict=True)
-    ]
+    parts = [particles_of(one, thing) for one, thing in zip(placed, scene.objects, strict=True)]
     arrangement = arrangement_of(parts, grid)
     config, model, state = solver_parts(scene, parts, arrangement, dtype)
     dt, steps, _ = choose_substep(
