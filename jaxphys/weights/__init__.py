@@ -8,7 +8,6 @@ A file is only read whole and only if its SHA-256 is the manifest's. An entry of
 import hashlib
 import json
 import shutil
-from functools import cache
 from pathlib import Path
 
 import numpy as np
