@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 import tyro
 
+from jaxphys.core.errors import InputError
+
 Positional = tyro.conf.Positional
 
 
@@ -247,7 +249,10 @@ def render(
     from jaxphys.pipeline.convert import render_file
     from jaxphys.scene.scene import View
 
-    view = View(azimuth, elevation, distance, field_of_view=field_of_view)
+    try:
+        view = View(azimuth, elevation, distance, field_of_view=field_of_view)
+    except InputError as error:
+        raise InputError(f"--{error}") from None
     render_file(
         file,
         out,

@@ -6,6 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxphys.core.errors import one_line
+
 ROWS = 40_000
 ADVICE = (
     "This JAX computes wrong numbers: install another, for example\n"
@@ -76,20 +78,34 @@ CHECKS: dict[str, Callable[[], tuple[float, float]]] = {
 }
 
 
+def _device_line() -> str:
+    device = jax.devices()[0]
+    return f"jax {jax.__version__} on {device.platform} ({device.device_kind})"
+
+
+def _check_line(name: str, check: Callable[[], tuple[float, float]]) -> tuple[bool, str]:
+    error, allowed = check()
+    good = error <= allowed
+    return good, f"{'ok  ' if good else 'FAIL'} {name}: error {error:.1e}, allowed {allowed:.0e}"
+
+
 def report(checks: dict[str, Callable[[], tuple[float, float]]] = CHECKS) -> tuple[str, bool]:
     """A line for each check against float64 numpy, with advice if one fails, and whether all
-    hold.
+    hold. A check that raises has failed; the others are made all the same.
     """
-    device = jax.devices()[0]
-    lines = [f"jax {jax.__version__} on {device.platform} ({device.device_kind})"]
-    healthy = True
+    lines, healthy = [], True
+    try:
+        lines.append(_device_line())
+    except Exception as error:  # of a JAX that does not work, anything can be expected
+        why = f"{type(error).__name__}: {error}"
+        return one_line(f"FAIL jax {jax.__version__}: finds no device ({why})"), False
     for name, check in checks.items():
-        error, allowed = check()
-        good = error <= allowed
+        try:
+            good, line = _check_line(name, check)
+        except Exception as error:
+            good, line = False, one_line(f"FAIL {name}: raised {type(error).__name__}: {error}")
         healthy &= good
-        lines.append(
-            f"{'ok  ' if good else 'FAIL'} {name}: error {error:.1e}, allowed {allowed:.0e}"
-        )
+        lines.append(line)
     if not healthy:
         lines.append(ADVICE)
     return "\n".join(lines), healthy

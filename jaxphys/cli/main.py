@@ -1,6 +1,13 @@
-"""The command line: thin commands over the pipeline."""
+"""The command line: thin commands over the pipeline, and the border where errors become lines.
 
+Exit status: 0 done; 1 something was found wrong, or this program is at fault; 2 what was asked for
+cannot be done; 130 interrupted; 141 whoever read the output has gone.
+"""
+
+import os
+import signal
 import sys
+import traceback
 import warnings
 from collections.abc import Sequence
 
@@ -8,50 +15,112 @@ import tyro
 
 from jaxphys.cli import commands, weights
 from jaxphys.cli.evaluate import evaluate
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, one_line
 
-INTERRUPTED = 130
+FAULT, REFUSED, INTERRUPTED, UNHEARD = 1, 2, 130, 141
+TRACEBACK = "--traceback"
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status.
 
-    What a user can mend is one line on standard error and status 2; an interrupt is 130.
+    What goes wrong is one line on standard error, and with `--traceback` anywhere among the
+    arguments the traceback before it.
+
+    Raises:
+        BrokenPipeError: nobody reads standard output any more.
     """
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    wanted = [argument for argument in given if argument != TRACEBACK]
     try:
-        status = tyro.extras.subcommand_cli_from_dict(
-            {
-                "generate": commands.generate,
-                "image": commands.image,
-                "animate": commands.animate,
-                "splat": commands.splat,
-                "render": commands.render,
-                "plan": commands.plan,
-                "materials": commands.materials,
-                "evaluate": evaluate,
-                "weights": weights.weights,
-                "doctor": commands.doctor,
-            },
-            prog="jaxphys",
-            description="Objects from text, meshes or splats that move as their material would.",
-            args=None if arguments is None else list(arguments),
-        )
-    except InputError as error:
-        print(f"jaxphys: {' '.join(str(error).split())}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        # A full disk or a folder that must not be written to is for the user to mend too.
-        where = f"{error.filename}: " if error.filename else ""
-        print(f"jaxphys: {where}{error.strerror or error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("jaxphys: interrupted; the same command resumes", file=sys.stderr)
-        return INTERRUPTED
+        return _dispatch(wanted)
+    except BrokenPipeError:
+        raise
+    except (Exception, KeyboardInterrupt) as error:
+        if len(wanted) < len(given):
+            traceback.print_exc()
+        line, status = _told(error)
+        print(f"jaxphys: {line}", file=sys.stderr)
+        return status
+
+
+def _dispatch(arguments: list[str]) -> int:
+    status = tyro.extras.subcommand_cli_from_dict(
+        {
+            "generate": commands.generate,
+            "image": commands.image,
+            "animate": commands.animate,
+            "splat": commands.splat,
+            "render": commands.render,
+            "plan": commands.plan,
+            "materials": commands.materials,
+            "evaluate": evaluate,
+            "weights": weights.weights,
+            "doctor": commands.doctor,
+        },
+        prog="jaxphys",
+        description=(
+            "Objects from text, meshes or splats that move as their material would. With"
+            f" {TRACEBACK} anywhere, an error shows where in the program it came up."
+        ),
+        args=arguments,
+    )
     return status or 0
+
+
+def _told(error: BaseException) -> tuple[str, int]:
+    """An error as a line and an exit status."""
+    match error:
+        case InputError():
+            return str(error), REFUSED
+        case KeyboardInterrupt():
+            return "interrupted; the same command resumes", INTERRUPTED
+        case OSError():
+            # A full disk or a folder that must not be written to is for the user to mend too.
+            where = f"{error.filename}: " if error.filename else ""
+            return one_line(f"{where}{error.strerror or error}"), REFUSED
+        case MemoryError():
+            return "there is not enough memory for this; ask for less at a time", REFUSED
+    if (line := _no_device()) is not None:
+        return line, REFUSED
+    notes = [note for note in getattr(error, "__notes__", ()) if note.startswith("while reading")]
+    what = one_line(" ".join([f"unexpected {type(error).__name__}", *notes]) + f": {error}", 220)
+    return f"{what}; run with {TRACEBACK} to see it, and please report it", FAULT
+
+
+def _no_device() -> str | None:
+    """Why JAX cannot compute at all, which comes up at its first use, wherever that is."""
+    if "jax" not in sys.modules:
+        return None
+    try:
+        sys.modules["jax"].devices()
+    except RuntimeError as error:
+        platforms = os.environ.get("JAX_PLATFORMS", "")
+        return one_line(f"JAX_PLATFORMS={platforms!r}: JAX finds no device ({error})")
+    return None
 
 
 def main() -> None:
     """Entry point of the `jaxphys` command."""
     # Warnings of libraries tell users of this command nothing that they could act on.
     warnings.simplefilter("ignore")
-    sys.exit(run())
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that knows ASCII only gets the code of a letter instead of a traceback.
+        if stream is not None:  # as it is where it was closed from outside
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        status = run()
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except KeyboardInterrupt:  # a second one, while the first was told
+        status = INTERRUPTED
+    except OSError as error:
+        if not isinstance(error, BrokenPipeError):
+            print(f"jaxphys: {_told(error)[0]}", file=sys.stderr)
+        status = UNHEARD if isinstance(error, BrokenPipeError) else REFUSED
+        # Python flushes once more as it ends, and would complain.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    finally:
+        # Whoever interrupts the end of the program means it, and needs no traceback.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    sys.exit(status)

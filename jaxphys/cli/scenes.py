@@ -5,8 +5,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, one_line
+from jaxphys.core.reading import reading
 from jaxphys.mpm.materials import get_material
+from jaxphys.scene.build import validate
 from jaxphys.scene.defaults import default_scene
 from jaxphys.scene.read import read_scene
 from jaxphys.scene.scene import Scene
@@ -32,10 +34,12 @@ def scene_for(
     if base is not None:
         scene = base
     elif config is not None:
-        loaded = read_scene(config)
+        with reading(config):
+            loaded = read_scene(config)
+            validate(loaded.scene)
         scene = loaded.scene
         for note in loaded.notes:
-            print(f"note: {note}", file=sys.stderr)
+            print(one_line(f"note: {note}"), file=sys.stderr)
         if material is not None:
             get_material(material)
             first = dataclasses.replace(scene.objects[0], material=material, parameters={})

@@ -1,5 +1,5 @@
 """What a declared number may be: its range and unit, stated once in the field's metadata, checked
-wherever the value comes from.
+wherever the value comes from, before any arithmetic.
 """
 
 import dataclasses
@@ -7,10 +7,13 @@ import math
 from collections.abc import Mapping
 from typing import Any, get_args
 
-from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.errors import InputError, nearest, shown
 
-POSITIVE = {"above": 0}
-NON_NEGATIVE = {"least": 0}
+# Where a field declares no bound of its own: squares and products of two still fit float32.
+LARGEST = 1e15
+
+POSITIVE = {"above": 0, "most": LARGEST}
+NON_NEGATIVE = {"least": 0, "most": LARGEST}
 
 
 def between(least: float, most: float) -> dict[str, float]:
@@ -30,12 +33,21 @@ def vector(*rules: Mapping[str, Any]) -> dict[str, Any]:
 
 def direction() -> dict[str, Any]:
     """Metadata for three numbers that give a direction, of any length but zero."""
-    return vector() | {"nonzero": True}
+    return vector(between(-1e6, 1e6)) | {"nonzero": True}
 
 
 def one_of(names: Any) -> dict[str, Any]:
     """Metadata for a text, or each of several, that is one of a Literal's."""
     return {"one_of": get_args(names)}
+
+
+# Of things that a person could mean, in SI units; wide enough to be in nobody's way.
+PLACE = between(-1e6, 1e6)
+LENGTH = {"above": 0} | between(1e-9, 1e6)
+TIME = between(-1e9, 1e9)
+DURATION = {"above": 0} | between(1e-12, 1e9)
+SPEED = between(-1e8, 1e8)
+SEED = between(0, 2**31 - 1)
 
 
 def _numbers(value: Any) -> list[float]:
@@ -56,7 +68,26 @@ def _check_form(name: str, value: Any, rules: Mapping[str, Any]) -> None:
             raise InputError(f"{name}: is zero; give a direction, of any length")
     for text in value if isinstance(value, tuple) else (value,):
         if "one_of" in rules and text is not None and text not in rules["one_of"]:
-            raise InputError(f"{name}: unknown value {text!r}; {nearest(text, rules['one_of'])}")
+            raise InputError(
+                f"{name}: unknown value {shown(text)}; {nearest(str(text), rules['one_of'])}"
+            )
+
+
+def check_number(name: str, number: float, rules: Mapping[str, Any]) -> None:
+    """Raises `InputError` where a number is not finite or outside of the range in `rules`."""
+    if number != number or number in (math.inf, -math.inf):
+        raise InputError(f"{name}: {number} is not a finite number")
+    least, most = rules.get("least", -LARGEST), rules.get("most", LARGEST)
+    if "above" in rules and not number > rules["above"]:
+        raise InputError(f"{name}: {shown(number)} must be above {_bound(rules['above'])}")
+    if not number >= least:
+        raise InputError(f"{name}: {shown(number)} must be at least {_bound(least)}")
+    if not number <= most:
+        raise InputError(f"{name}: {shown(number)} must be at most {_bound(most)}")
+
+
+def _bound(value: float) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def check_ranges(instance: Any) -> None:
@@ -66,15 +97,7 @@ def check_ranges(instance: Any) -> None:
     for entry in dataclasses.fields(instance):
         _check_form(entry.name, getattr(instance, entry.name), entry.metadata)
         for number in _numbers(getattr(instance, entry.name)):
-            if not math.isfinite(number):
-                raise InputError(f"{entry.name}: {number} is not a finite number")
-            rules = entry.metadata
-            if "above" in rules and not number > rules["above"]:
-                raise InputError(f"{entry.name}: {number} must be above {rules['above']}")
-            if "least" in rules and not number >= rules["least"]:
-                raise InputError(f"{entry.name}: {number} must be at least {rules['least']}")
-            if "most" in rules and not number <= rules["most"]:
-                raise InputError(f"{entry.name}: {number} must be at most {rules['most']}")
+            check_number(entry.name, number, entry.metadata)
 
 
 class Checked:

@@ -2,15 +2,19 @@
 
 import errno
 import json
+import math
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any, NoReturn
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, shown
+from jaxphys.core.reading import reading
 
 LARGEST_JSON = 64 * 1024 * 1024
+MOST_DIGITS = 40
 ASIDE = re.compile(r"\.jaxphys-(\d+)-(.+)", re.DOTALL)
 # What only a disk answers: whatever else fails while a file is written is for others to tell.
 DISK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO,
@@ -93,20 +97,47 @@ def output_file(
     return path
 
 
-def read_json(path: str | os.PathLike) -> dict:
-    """The object in a small JSON file. Raises InputError, naming it, for anything else."""
-    path = Path(path)
-    try:
-        if path.stat().st_size > LARGEST_JSON:
-            raise InputError(f"{path}: is larger than {LARGEST_JSON} bytes; is it the right file?")
-        value = json.loads(path.read_bytes())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except ValueError as error:
-        raise InputError(f"{path}: is not JSON ({error}); get the file again") from None
-    if not isinstance(value, dict):
-        raise InputError(f"{path}: holds {type(value).__name__}, not a JSON object")
-    return value
+def read_json(path: str | os.PathLike, largest: int = LARGEST_JSON) -> dict[str, Any]:
+    """The object in a JSON file.
+
+    What JSON does not know (NaN, infinities) or no number type here holds (1e999, whole numbers of
+    more than `MOST_DIGITS` digits) is refused.
+
+    Raises:
+        InputError: anything else than such a file of at most `largest` bytes; names it.
+    """
+    with reading(path, largest):
+        try:
+            value = json.loads(
+                Path(path).read_text(encoding="utf-8"),
+                parse_constant=_refuse_number,
+                parse_float=_finite,
+                parse_int=_whole,
+            )
+        except UnicodeDecodeError:
+            raise InputError("is not a text file; JSON is text in UTF-8") from None
+        except json.JSONDecodeError as error:
+            raise InputError(
+                f"not valid JSON at line {error.lineno}, column {error.colno}: {error.msg}"
+            ) from None
+        except RecursionError:
+            raise InputError("is nested too deeply") from None
+        if not isinstance(value, dict):
+            raise InputError(f"expected an object {{ ... }}, found {shown(value)}")
+        return value
+
+
+def _refuse_number(text: str) -> NoReturn:
+    raise InputError(f"{shown(text)} is not a number that fits; write a smaller, finite one")
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    return value if math.isfinite(value) else _refuse_number(text)
+
+
+def _whole(text: str) -> int:
+    return int(text) if len(text) <= MOST_DIGITS else _refuse_number(text)
 
 
 def write_json(path: str | os.PathLike, value) -> None:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, one_line
+from jaxphys.core.fields import between, check_number
 from jaxphys.core.files import read_json, write_json
 from jaxphys.core.run_folder import added_file
 from jaxphys.evaluate.aesthetic import HEADS, load_head
@@ -64,8 +65,8 @@ def evaluate(
         InputError: there is no video, no prompt or no CLIP, or the file cannot be written.
     """
     directory = Path(directory)
-    if frames is not None and frames < 1:
-        raise InputError(f"--frames {frames}: must be at least 1")
+    if frames is not None:
+        check_number("--frames", frames, between(1, 100_000))
     if not directory.is_dir():
         raise InputError(f"{directory}: is no directory; name one that generate or animate made")
     prompt = find_prompt(directory) if prompt is None else prompt
@@ -120,7 +121,7 @@ def as_text(result: dict[str, Any]) -> str:
     """What `evaluate` found, for people; what is unavailable is left out."""
     frames, clip = result["frames"], result["clip"]
     lines = [
-        f'"{result["prompt"]}": {frames["scored"]} of {frames["total"]} pictures',
+        f'"{one_line(result["prompt"], 1000)}": {frames["scored"]} of {frames["total"]} pictures',
         f"  CLIP score           {clip['score']:7.3f}   100 max(cos, 0), mean over pictures",
         f"  cosine               {clip['cosine']:7.4f}   the same without cutting and scaling",
     ]

@@ -1,5 +1,7 @@
 """Textured meshes from files, as plain triangles with colours (needs the extra `mesh`: trimesh)."""
 
+import json
+import logging
 import os
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,12 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.reading import reading
 
 # glTF prescribes y up, and most .obj exporters write it; CAD and scanning formats have z up.
 _UP = {".glb": "y", ".gltf": "y", ".obj": "y"}
 _OPAQUE = -1.0
 # Readers hold a file several times over.
 _FILE_BYTES = 2**30
+_MOST_ELEMENTS = 10**8
+# Of all textures of a mesh together; a picture may be thousands of times larger than its file.
+_MOST_TEXELS = 8192**2
+# Squares of areas of triangles between these lengths still fit float64.
+_SHORTEST, _LONGEST = 1e-15, 1e15
+_MOST_REPEATS = 1e6
 
 
 @dataclass(frozen=True)
@@ -52,6 +61,8 @@ def _import_trimesh():
         raise InputError(
             "reading meshes needs trimesh: pip install 'jaxphys-splats[mesh]'"
         ) from error
+    # It tells the user of what it meets, tracebacks included, unless somebody listens.
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())
     return trimesh
 
 
@@ -63,11 +74,11 @@ def _encode(linear: np.ndarray) -> np.ndarray:
     return np.concatenate([rgb, linear[..., 3:]], axis=-1)
 
 
-def _rgba(values) -> np.ndarray:
-    """Bytes or floats, RGB or RGBA, as float RGBA."""
+def _rgba(values, dtype=np.float64) -> np.ndarray:
+    """Bytes or floats, RGB or RGBA, as float RGBA in [0, 1]."""
     values = np.asarray(values)
     scale = 255 if np.issubdtype(values.dtype, np.integer) else 1
-    values = values.astype(np.float64) / scale
+    values = np.clip(values.astype(dtype) / dtype(scale), 0, 1)
     if values.shape[-1] == 3:
         values = np.concatenate([values, np.ones_like(values[..., :1])], axis=-1)
     return values
@@ -101,12 +112,15 @@ def _require_companions(path: Path) -> None:
 
     def named(file: Path, keyword: str) -> list[Path]:
         lines = file.read_text(errors="replace").splitlines()
-        rests = [line.split(None, 1)[1].strip() for line in lines if line.startswith(keyword + " ")]
-        return [file.parent / rest.replace("\\", "/") for rest in rests]
+        found = [words for line in lines if (words := line.split(None, 1))[:1] == [keyword]]
+        if any(len(words) < 2 or "\0" in words[1] for words in found):
+            raise InputError(f"{file}: a line {keyword} names no file; export it again")
+        return [file.parent / words[1].strip().replace("\\", "/") for words in found]
 
     for library in named(path, "mtllib"):
         if not library.is_file():
             raise InputError(f"{path}: its materials {library} are missing; put the file there")
+        texels = 0
         for image in named(library, "map_Kd"):
             if not image.is_file():
                 image = image.parent / image.name.split()[-1]  # "map_Kd -s 1 1 1 name.png"
@@ -114,11 +128,32 @@ def _require_companions(path: Path) -> None:
                 raise InputError(f"{library}: its texture {image} is missing; put the file there")
             try:
                 with Image.open(image) as opened:
+                    texels += _texels(opened)
+                    _require_texels(texels, library)
                     opened.load()
+            except InputError:
+                raise
             except Exception as error:  # decoders of a dozen formats raise whatever they meet
                 raise InputError(
                     f"{library}: its texture {image} cannot be read ({error}); export it again"
                 ) from error
+
+
+def _require_few_elements(path: Path) -> None:
+    """An accessor without data stands for zeros, as many as it says."""
+    with path.open("rb") as file:
+        start = file.read(20)
+        binary = start[:4] == b"glTF"
+        text = file.read(int.from_bytes(start[12:16], "little")) if binary else start + file.read()
+    try:
+        count = sum(accessor["count"] for accessor in json.loads(text)["accessors"])
+    except (ValueError, LookupError, TypeError, RecursionError):
+        return  # it is no glTF, which its own reader will tell
+    if not count <= _MOST_ELEMENTS:
+        raise InputError(
+            f"{path}: promises {count:.3g} corners and indices, more than the limit of "
+            f"{_MOST_ELEMENTS:.3g}; simplify the mesh"
+        )
 
 
 def load_mesh(path: str | os.PathLike, *, up: str | None = None) -> Mesh:
@@ -135,37 +170,58 @@ def load_mesh(path: str | os.PathLike, *, up: str | None = None) -> Mesh:
         InputError: trimesh is not installed; the file or a texture is missing, cannot be parsed,
             holds no triangles, has corners that are not finite, or no extent along some axis.
     """
-    path = Path(path)
     if up not in (None, "y", "z"):
         raise InputError(f"up={up!r}: give 'y' or 'z'")
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; check the path")
-    if path.stat().st_size > _FILE_BYTES:
-        raise InputError(
-            f"{path}: {path.stat().st_size / 2**30:.1f} GiB, more than the limit of "
-            f"{_FILE_BYTES // 2**30}; simplify the mesh"
+    with reading(path, _FILE_BYTES) as path:
+        mesh = _joined(
+            path, _parts(path, _import_trimesh()), up or _UP.get(path.suffix.lower(), "z")
         )
-    trimesh = _import_trimesh()
-    suffix = path.suffix.lower()
-    if suffix == ".obj":
+        _require_solid(path, mesh)
+        return mesh
+
+
+def _parts(path: Path, trimesh) -> list[tuple[np.ndarray, object]]:
+    """The transform (4, 4) and the geometry of each part of a file."""
+    if path.suffix.lower() == ".obj":
         _require_companions(path)
+    if path.suffix.lower() in (".glb", ".gltf"):
+        _require_few_elements(path)
     try:
         scene = trimesh.load_scene(path, process=False)
-        parts = [(scene.graph[node], node) for node in scene.graph.nodes_geometry]
+        nodes = [scene.graph[node] for node in scene.graph.nodes_geometry]
+        return [(matrix, scene.geometry[name]) for matrix, name in nodes]
     except Exception as error:  # parsers of a dozen formats raise whatever they meet
         raise InputError(
             f"{path}: cannot be read as a mesh ({type(error).__name__}: {error}); export it again"
             f" as .glb, .obj, .stl or .ply"
         ) from error
+
+
+def _texels(image) -> int:
+    """Read from a picture's header, before it is unpacked."""
+    return image.size[0] * image.size[1]
+
+
+def _require_texels(count: int, path: Path) -> None:
+    if count > _MOST_TEXELS:
+        raise InputError(
+            f"{path}: its textures have {count / 1e6:.0f} million pixels, more than the limit of "
+            f"{_MOST_TEXELS / 1e6:.0f}; scale them down"
+        )
+
+
+def _joined(path: Path, parts: list[tuple[np.ndarray, object]], up: str) -> Mesh:
     pieces = []
     images: dict[int, int] = {}
     textures: list[np.ndarray] = []
-    linear = suffix in (".glb", ".gltf")
-    for (matrix, name), _ in parts:
-        part = scene.geometry[name]
+    texels = 0
+    linear = path.suffix.lower() in (".glb", ".gltf")
+    for matrix, part in parts:
         faces = getattr(part, "faces", None)
         if faces is None or len(faces) == 0:
             continue
+        if np.ndim(part.vertices) != 2 or np.shape(part.vertices)[1] != 3:
+            raise InputError(f"{path}: corners that are no three numbers each; export it again")
         outside = (np.asarray(faces) < 0) | (np.asarray(faces) >= len(part.vertices))
         if outside.any():
             raise InputError(
@@ -178,12 +234,24 @@ def load_mesh(path: str | os.PathLike, *, up: str | None = None) -> Mesh:
         colours, uvs = np.ones((*corners.shape[:2], 4)), np.zeros((*corners.shape[:2], 2))
         index, cutoff = -1, _OPAQUE
         if part.visual.kind == "texture":
-            factor, image, cutoff = _material(part.visual.material, linear)
-            colours = colours * factor
-            if image is not None and part.visual.uv is not None:
-                if id(image) not in images:
+            try:
+                factor, image, cutoff = _material(part.visual.material, linear)
+                if part.visual.uv is None:
+                    image = None
+                if image is not None and id(image) not in images:
                     images[id(image)] = len(textures)
-                    textures.append(_rgba(np.asarray(image.convert("RGBA"))))
+                    texels += _texels(image)
+                    _require_texels(texels, path)
+                    textures.append(_rgba(np.asarray(image.convert("RGBA")), np.float32))
+            except InputError:
+                raise
+            except Exception as error:  # of a kind that no material has, or a broken picture
+                raise InputError(
+                    f"{path}: a material cannot be used ({type(error).__name__}: {error}); export "
+                    "it again"
+                ) from error
+            colours = colours * factor
+            if image is not None:
                 index, uvs = images[id(image)], np.asarray(part.visual.uv, np.float64)[faces]
             vertex = part.vertex_attributes.get("color")
         else:
@@ -200,21 +268,28 @@ def load_mesh(path: str | os.PathLike, *, up: str | None = None) -> Mesh:
     if not pieces:
         raise InputError(f"{path}: no triangles (a point cloud or an empty file); give a surface")
     corners, colours, uvs, texture, cutoff = (np.concatenate(p) for p in zip(*pieces, strict=True))
-    bad = ~np.isfinite(corners).all(axis=(1, 2))
+    bad = ~(np.abs(corners) < _LONGEST).all(axis=(1, 2))
     if bad.any():
         raise InputError(
-            f"{path}: {bad.sum()} of {bad.size} triangles have corners that are not finite (first: "
-            f"{np.argmax(bad)}); repair the mesh"
+            f"{path}: {bad.sum()} of {bad.size} triangles have corners that are not finite or "
+            f"beyond {_LONGEST:g} (first: {np.argmax(bad)}); repair the mesh"
         )
-    if (up or _UP.get(suffix, "z")) == "y":
+    if not np.isfinite(colours).all():
+        raise InputError(f"{path}: colours that are not finite; repair the mesh")
+    if up == "y":
         corners = np.stack([corners[..., 0], -corners[..., 2], corners[..., 1]], axis=-1)
-    mesh = Mesh(corners, colours, np.nan_to_num(uvs), tuple(textures), texture, cutoff)
-    extent = np.ptp(corners.reshape(-1, 3), axis=0)
+    uvs = np.clip(np.nan_to_num(uvs), -_MOST_REPEATS, _MOST_REPEATS)
+    return Mesh(corners, colours, uvs, tuple(textures), texture, cutoff)
+
+
+def _require_solid(path: Path, mesh: Mesh) -> None:
+    extent = np.ptp(mesh.triangles.reshape(-1, 3), axis=0)
     if extent.min() <= 1e-6 * extent.max():
         axis = "xyz"[int(np.argmin(extent))]
         raise InputError(
             f"{path}: flat, no extent along {axis}: it encloses no volume; give it thickness"
         )
+    if extent.max() < _SHORTEST:
+        raise InputError(f"{path}: is smaller than {_SHORTEST:g} in all; scale it up")
     if not mesh.areas().sum() > 0:
         raise InputError(f"{path}: every triangle has zero area; repair the mesh")
-    return mesh

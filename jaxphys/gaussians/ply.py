@@ -13,8 +13,10 @@ from typing import BinaryIO
 import jax.numpy as jnp
 import numpy as np
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, shown
+from jaxphys.core.fields import LARGEST
 from jaxphys.core.files import atomic_path
+from jaxphys.core.reading import reading
 from jaxphys.gaussians.gaussians import (
     LOG_SCALE_LIMIT,
     LOGIT_LIMIT,
@@ -125,10 +127,10 @@ def _read_header(file: BinaryIO, path) -> tuple[str, list[_Element]]:
                 elements[-1].has_list = True
             case ["property", kind, name] if elements and kind in _TYPES:
                 if name in dict(elements[-1].properties):
-                    raise InputError(f"{path}: field '{name}' stands twice; export it again")
+                    raise InputError(f"{path}: field {shown(name)} stands twice; export it again")
                 elements[-1].properties.append((name, _TYPES[kind]))
             case _:
-                raise InputError(f"{path}: header line '{' '.join(words)[:80]}' is not known")
+                raise InputError(f"{path}: header line {shown(' '.join(words))} is not known")
     raise InputError(f"{path}: the header has no end; the file is cut off or not a .ply")
 
 
@@ -141,6 +143,8 @@ def _read_table(file: BinaryIO, path, style: str, elements: list[_Element], limi
         before.append(element)
     else:
         raise InputError(f"{path}: no 'vertex' element; export Gaussians as a 3DGS .ply")
+    if not element.properties:
+        raise InputError(f"{path}: its 'vertex' element has no fields; export a 3DGS .ply")
     if element.has_list or any(other.has_list for other in before):
         raise InputError(f"{path}: list properties up to 'vertex' cannot be read; export it again")
     if element.count > limit:
@@ -229,13 +233,14 @@ def _require(path, table: dict[str, np.ndarray]) -> int:
 
 
 def _require_finite_fields(path, names: list[str], values: np.ndarray) -> None:
-    bad = ~np.isfinite(values)
+    bad = ~(np.abs(values) <= LARGEST)
     if bad.any():
         column = int(np.argmax(bad.any(axis=0)))
         rows = bad[:, column]
         raise InputError(
-            f"{path}: field '{names[column]}' is not finite for {rows.sum()} of {rows.size} "
-            f"Gaussians (first: {np.argmax(rows)}); clean it up or pass drop_invalid=True"
+            f"{path}: field '{names[column]}' is not finite, or beyond {LARGEST:g}, for "
+            f"{rows.sum()} of {rows.size} Gaussians (first: {np.argmax(rows)}); clean it up or "
+            "pass drop_invalid=True"
         )
 
 
@@ -262,13 +267,14 @@ def read_ply(
         InputError: the file is missing, cut off, not a Gaussian .ply, too large, of a degree above
             3, or holds values that are not finite.
     """
-    path = Path(path)
-    try:
+    with reading(path) as path:
         with open(path, "rb") as file:
             style, elements = _read_header(file, path)
             table = _read_table(file, path, style, elements, limit)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from error
+        return _gaussians(path, table, dtype, drop_invalid)
+
+
+def _gaussians(path: Path, table: dict[str, np.ndarray], dtype, drop_invalid: bool) -> Gaussians:
     names = _fields(_require(path, table))
     names = [name for name in names if name not in _NORMAL]
     with np.errstate(over="ignore"):
@@ -278,7 +284,7 @@ def read_ply(
     logits[np.isinf(logits)] = np.sign(logits[np.isinf(logits)]) * LOGIT_LIMIT
     log_scales[np.isneginf(log_scales)] = -LOG_SCALE_LIMIT
     if drop_invalid:
-        values = values[np.isfinite(values).all(axis=1)]
+        values = values[(np.abs(values) <= LARGEST).all(axis=1)]
     _require_finite_fields(path, names, values)
     count = values.shape[0]
     dc = values[:, 3:6].reshape(count, 1, 3)

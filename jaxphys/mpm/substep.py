@@ -38,10 +38,10 @@ def choose_substep(
             validate_dt(wanted, bounds, unsafe=not config.check_step)
         except InputError as error:
             raise InputError(f"substep: {error}, or set unsafe_substep") from None
-    if frame_time / wanted > MOST_STEPS:
+    if not frame_time <= MOST_STEPS * wanted:  # also where the step is zero or not a number
         raise InputError(
-            f"substep: {wanted:.3g} s makes {frame_time / wanted:.3g} steps a frame, more than "
-            f"{MOST_STEPS}; use a coarser grid or a softer or denser material"
+            f"substep: {wanted:.3g} s makes more than {MOST_STEPS} steps a frame; use a coarser "
+            "grid or a softer or denser material"
         )
     steps = max(1, math.ceil(frame_time / wanted - 1e-9))
     return frame_time / steps, steps, bounds

@@ -2,7 +2,7 @@
 (Rombach et al. 2022; Kingma & Welling 2014). Each can be filled without the other."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +10,7 @@ from flax import nnx
 from jax import Array
 
 from jaxphys.networks import transformer
-from jaxphys.networks.diffusers_config import DiffusersConfig
+from jaxphys.networks.diffusers_config import LAYERS, NUMBER, SIZE, DiffusersConfig
 from jaxphys.networks.layers import Conv2d, GroupNorm, Linear
 from jaxphys.networks.resnet import COSTLY, Downsample, ResnetBlock, Upsample
 from jaxphys.networks.transformer import CrossAttention
@@ -45,16 +45,16 @@ class AutoencoderConfig(DiffusersConfig):
     }
     IDLE = ("dropout", "force_upcast", "sample_size")
 
-    in_channels: int = 3
-    out_channels: int = 3
-    latent_channels: int = 4
-    block_out_channels: tuple[int, ...] = (64,)
-    layers_per_block: int = 1
+    in_channels: int = field(default=3, metadata=SIZE)
+    out_channels: int = field(default=3, metadata=SIZE)
+    latent_channels: int = field(default=4, metadata=SIZE)
+    block_out_channels: tuple[int, ...] = field(default=(64,), metadata=SIZE)
+    layers_per_block: int = field(default=1, metadata=LAYERS)
     down_block_types: tuple[str, ...] = DOWN_BLOCKS
     up_block_types: tuple[str, ...] = UP_BLOCKS
-    norm_num_groups: int = 32
-    scaling_factor: float = 0.18215
-    attention_slice: int | None = None
+    norm_num_groups: int = field(default=32, metadata=SIZE)
+    scaling_factor: float = field(default=0.18215, metadata=NUMBER)
+    attention_slice: int | None = field(default=None, metadata=SIZE)
 
 
 def _resnets(inputs: int, outputs: int, count: int, config: AutoencoderConfig) -> nnx.List:

@@ -4,15 +4,19 @@ Fields are named as in the file. Their defaults are those of the published forma
 what does not differ from them.
 """
 
-import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Self
 
-from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.dataclass_reader import from_json
+from jaxphys.core.errors import InputError, nearest, shown
+from jaxphys.core.fields import between
 from jaxphys.networks.layers import gelu, quick_gelu
 
 ACTIVATIONS = {"quick_gelu": quick_gelu, "gelu": gelu}
 LEGACY_END = 2
+SIZE = between(1, 10_000_000)
+LAYERS = between(1, 1000)
+EPSILON = {"above": 0, "most": 1.0}
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,7 @@ class _Tower:
     def __post_init__(self):
         if self.hidden_act not in ACTIVATIONS:
             tail = nearest(self.hidden_act, ACTIVATIONS)
-            raise InputError(f"hidden_act: {self.hidden_act!r} is not supported; {tail}")
+            raise InputError(f"hidden_act: {shown(self.hidden_act)} is not supported; {tail}")
         if self.hidden_size % self.num_attention_heads:
             raise InputError(
                 f"num_attention_heads: {self.num_attention_heads} does not divide"
@@ -48,27 +52,11 @@ class _Tower:
         elif values.get("model_type") != cls.MODEL_TYPE:
             raise InputError(
                 f"{source}: model_type: expected 'clip' or {cls.MODEL_TYPE!r},"
-                f" found {values.get('model_type')!r}"
+                f" found {shown(values.get('model_type'))}"
             )
-        fields = {entry.name: entry.type for entry in dataclasses.fields(cls)}
-        given = {name: part[name] for name in fields if part.get(name) is not None}
-        try:
-            for name, value in given.items():
-                _check(name, fields[name], value)
-            return cls(**given)
-        except InputError as error:
-            raise InputError(f"{source}: {error}") from None
-
-
-def _check(name: str, kind: type, value: Any) -> None:
-    if kind is str:
-        good, expected = isinstance(value, str), "a string"
-    else:
-        types = int if kind is int else (int, float)
-        good = isinstance(value, types) and not isinstance(value, bool) and value > 0
-        expected = "a positive integer" if kind is int else "a positive number"
-    if not good:
-        raise InputError(f"{name}: expected {expected}, found {value!r}")
+        # Published files write null for what has its default.
+        given = {key: value for key, value in part.items() if value is not None}
+        return from_json(cls, given, f"{source}: ", unknown=lambda key, value: None)
 
 
 @dataclass(frozen=True)
@@ -80,16 +68,16 @@ class TextConfig(_Tower):
     PART = "text_config"
     MODEL_TYPE = "clip_text_model"
 
-    vocab_size: int = 49408
-    hidden_size: int = 512
-    intermediate_size: int = 2048
-    projection_dim: int = 512
-    num_hidden_layers: int = 12
-    num_attention_heads: int = 8
-    max_position_embeddings: int = 77
+    vocab_size: int = field(default=49408, metadata=SIZE)
+    hidden_size: int = field(default=512, metadata=SIZE)
+    intermediate_size: int = field(default=2048, metadata=SIZE)
+    projection_dim: int = field(default=512, metadata=SIZE)
+    num_hidden_layers: int = field(default=12, metadata=LAYERS)
+    num_attention_heads: int = field(default=8, metadata=SIZE)
+    max_position_embeddings: int = field(default=77, metadata=SIZE)
     hidden_act: str = "quick_gelu"
-    layer_norm_eps: float = 1e-5
-    eos_token_id: int = 49407
+    layer_norm_eps: float = field(default=1e-5, metadata=EPSILON)
+    eos_token_id: int = field(default=49407, metadata=SIZE)
 
 
 @dataclass(frozen=True)
@@ -99,12 +87,12 @@ class VisionConfig(_Tower):
     PART = "vision_config"
     MODEL_TYPE = "clip_vision_model"
 
-    hidden_size: int = 768
-    intermediate_size: int = 3072
-    projection_dim: int = 512
-    num_hidden_layers: int = 12
-    num_attention_heads: int = 12
-    image_size: int = 224
-    patch_size: int = 32
+    hidden_size: int = field(default=768, metadata=SIZE)
+    intermediate_size: int = field(default=3072, metadata=SIZE)
+    projection_dim: int = field(default=512, metadata=SIZE)
+    num_hidden_layers: int = field(default=12, metadata=LAYERS)
+    num_attention_heads: int = field(default=12, metadata=SIZE)
+    image_size: int = field(default=224, metadata=SIZE)
+    patch_size: int = field(default=32, metadata=SIZE)
     hidden_act: str = "quick_gelu"
-    layer_norm_eps: float = 1e-5
+    layer_norm_eps: float = field(default=1e-5, metadata=EPSILON)

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 from tokenizers import AddedToken, Regex, Tokenizer, models, normalizers, pre_tokenizers
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, shown
 from jaxphys.core.files import read_json
+from jaxphys.core.reading import reading
 
 START, END = "<|startoftext|>", "<|endoftext|>"
 LENGTH = 77
+MOST_PIECES = 10_000_000
 # Marks, English contractions, runs of letters, single digits, runs of anything else.
 WORDS = (
     r"<\|startoftext\|>|<\|endoftext\|>|'s|'t|'re|'ve|'m|'ll|'d"
@@ -46,6 +48,11 @@ class ClipTokenizer:
         for name, mark in marks.items():
             if mark.content not in vocabulary:
                 raise InputError(f"{source}: {mark.content!r}, the {name}, is not in it")
+        wrong = [
+            id for id in vocabulary.values() if type(id) is not int or not 0 <= id < MOST_PIECES
+        ]
+        if wrong:
+            raise InputError(f"{source}: {shown(wrong[0])} is no number that a piece can have")
         try:
             model = models.BPE(vocabulary, merges, end_of_word_suffix="</w>", unk_token=END)
         except Exception as error:  # the library raises nothing narrower
@@ -88,10 +95,11 @@ def _pieces(folder: Path) -> tuple[dict[str, int], list[tuple[str, str]], Path]:
         merges = folder / "merges.txt"
         if not merges.is_file():
             raise InputError(f"{merges}: is missing; it belongs beside vocab.json")
-        try:
-            lines = merges.read_text(encoding="utf-8").split("\n")
-        except ValueError as error:
-            raise InputError(f"{merges}: is damaged: {error}") from None
+        with reading(merges):
+            try:
+                lines = merges.read_text(encoding="utf-8").split("\n")
+            except ValueError as error:
+                raise InputError(f"{merges}: is damaged: {error}") from None
         pairs = [line for line in lines[lines[0].startswith("#version") :] if line]
     elif whole.exists():
         model, source = read_json(whole).get("model"), whole
@@ -125,5 +133,5 @@ def _named_marks(folder: Path) -> dict[str, AddedToken]:
                 given = {flag: entry[flag] for flag in flags if flag in entry}
                 marks[key] = AddedToken(entry["content"], special=True, **given)
             elif entry is not None:
-                raise InputError(f"{path}: {key}: expected a string, found {entry!r}")
+                raise InputError(f"{path}: {key}: expected a string, found {shown(entry)}")
     return marks

@@ -4,12 +4,13 @@ Fields are named as in the config.json of the first format; GGUF files say the s
 What would need another computation than `llama` has is refused, by the name of the field.
 """
 
-import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Self
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.dataclass_reader import from_json
+from jaxphys.core.errors import InputError, shown
+from jaxphys.core.fields import between
 
 # Fields of config.json that change the computation, with the values under which they do not.
 PLAIN = {
@@ -21,6 +22,8 @@ PLAIN = {
     "sliding_window": (None,),
     "quantization_config": (None,),
 }
+SIZE = between(1, 10_000_000)
+LAYERS = between(1, 1000)
 GGUF_NAMES = {
     "hidden_size": "embedding_length",
     "intermediate_size": "feed_forward_length",
@@ -40,16 +43,16 @@ class LlamaConfig:
     imply: as many as attention heads, and the width divided among them.
     """
 
-    vocab_size: int
-    hidden_size: int
-    intermediate_size: int
-    num_hidden_layers: int
-    num_attention_heads: int
-    num_key_value_heads: int = 0
-    head_dim: int = 0
-    max_position_embeddings: int = 2048
-    rms_norm_eps: float = 1e-6
-    rope_theta: float = 10000.0
+    vocab_size: int = field(metadata=SIZE)
+    hidden_size: int = field(metadata=SIZE)
+    intermediate_size: int = field(metadata=SIZE)
+    num_hidden_layers: int = field(metadata=LAYERS)
+    num_attention_heads: int = field(metadata=SIZE)
+    num_key_value_heads: int = field(default=0, metadata=between(0, 100_000))
+    head_dim: int = field(default=0, metadata=between(0, 100_000))
+    max_position_embeddings: int = field(default=2048, metadata=between(1, 100_000_000))
+    rms_norm_eps: float = field(default=1e-6, metadata={"above": 0, "most": 1.0})
+    rope_theta: float = field(default=10000.0, metadata={"above": 0, "most": 1e12})
     tie_word_embeddings: bool = False
 
     def __post_init__(self):
@@ -75,14 +78,14 @@ class LlamaConfig:
             raise InputError(f"{source}: expected an object {{ ... }}")
         if values.get("model_type") != "llama":
             raise InputError(
-                f"{source}: model_type: expected 'llama', found {values.get('model_type')!r}"
+                f"{source}: model_type: expected 'llama', found {shown(values.get('model_type'))}"
             )
         for name, plain in PLAIN.items():
             if name in values and values[name] not in plain:
-                raise InputError(f"{source}: {name}: {values[name]!r} is not supported")
+                raise InputError(f"{source}: {name}: {shown(values[name])} is not supported")
         rotary = values.get("rope_parameters") or {}
         if not isinstance(rotary, Mapping) or rotary.get("rope_type", "default") != "default":
-            raise InputError(f"{source}: rope_parameters: {rotary!r} is not supported")
+            raise InputError(f"{source}: rope_parameters: {shown(rotary)} is not supported")
         return cls._checked({**rotary, **values}, source)
 
     @classmethod
@@ -93,10 +96,14 @@ class LlamaConfig:
         """
         kind = metadata.get("general.architecture")
         if kind != "llama":
-            raise InputError(f"{source}: general.architecture: expected 'llama', found {kind!r}")
+            raise InputError(
+                f"{source}: general.architecture: expected 'llama', found {shown(kind)}"
+            )
         scaling = metadata.get("llama.rope.scaling.type", "none")
         if scaling != "none" or metadata.get("llama.rope.scale_linear", 1.0) != 1.0:
-            raise InputError(f"{source}: llama.rope.scaling.type: {scaling!r} is not supported")
+            raise InputError(
+                f"{source}: llama.rope.scaling.type: {shown(scaling)} is not supported"
+            )
         if metadata.get("llama.expert_count", 0):
             raise InputError(f"{source}: llama.expert_count: experts are not supported")
         values = {
@@ -118,24 +125,6 @@ class LlamaConfig:
 
     @classmethod
     def _checked(cls, values: Mapping[str, Any], source: str) -> Self:
-        given = {}
-        for field in dataclasses.fields(cls):
-            value = values.get(field.name)
-            if value is None:
-                if field.default is dataclasses.MISSING:
-                    raise InputError(f"{source}: {field.name}: is missing")
-                continue
-            kinds = {int: int, float: (int, float), bool: bool}[field.type]
-            wrong_bool = isinstance(value, bool) and field.type is not bool
-            if (
-                not isinstance(value, kinds)
-                or wrong_bool
-                or (field.type is not bool and value <= 0)
-            ):
-                kind = "true or false" if field.type is bool else "a positive number"
-                raise InputError(f"{source}: {field.name}: expected {kind}, found {value!r}")
-            given[field.name] = value
-        try:
-            return cls(**given)
-        except InputError as error:
-            raise InputError(f"{source}: {error}") from None
+        # Published files write null for what has its default.
+        given = {key: value for key, value in values.items() if value is not None}
+        return from_json(cls, given, f"{source}: ", unknown=lambda key, value: None)

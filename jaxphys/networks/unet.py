@@ -1,7 +1,7 @@
 """The denoiser of Stable Diffusion 1 and 2: a U-Net (Ronneberger et al. 2015) over latents that
 reads a text between its convolutions (Rombach et al. 2022)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +10,7 @@ from jax import Array
 
 from jaxphys.core.errors import InputError
 from jaxphys.networks import transformer
-from jaxphys.networks.diffusers_config import DiffusersConfig
+from jaxphys.networks.diffusers_config import LAYERS, NUMBER, SIZE, DiffusersConfig
 from jaxphys.networks.layers import Conv2d, GroupNorm
 from jaxphys.networks.resnet import Downsample, ResnetBlock, Upsample
 from jaxphys.networks.timestep import TimestepEmbedding, waves
@@ -50,20 +50,20 @@ class UNetConfig(DiffusersConfig):
         "addition_embed_type_num_heads",
     )
 
-    sample_size: int = 64
-    in_channels: int = 4
-    out_channels: int = 4
-    block_out_channels: tuple[int, ...] = (320, 640, 1280, 1280)
-    layers_per_block: int = 2
+    sample_size: int = field(default=64, metadata=SIZE)
+    in_channels: int = field(default=4, metadata=SIZE)
+    out_channels: int = field(default=4, metadata=SIZE)
+    block_out_channels: tuple[int, ...] = field(default=(320, 640, 1280, 1280), metadata=SIZE)
+    layers_per_block: int = field(default=2, metadata=LAYERS)
     down_block_types: tuple[str, ...] = (DOWN_READING,) * 3 + ("DownBlock2D",)
     up_block_types: tuple[str, ...] = ("UpBlock2D",) + (UP_READING,) * 3
-    attention_head_dim: int | tuple[int, ...] = 8
-    cross_attention_dim: int = 1280
-    norm_num_groups: int = 32
-    norm_eps: float = 1e-5
+    attention_head_dim: int | tuple[int, ...] = field(default=8, metadata=SIZE)
+    cross_attention_dim: int = field(default=1280, metadata=SIZE)
+    norm_num_groups: int = field(default=32, metadata=SIZE)
+    norm_eps: float = field(default=1e-5, metadata=NUMBER)
     flip_sin_to_cos: bool = True
-    freq_shift: float = 0
-    attention_slice: int | None = None
+    freq_shift: float = field(default=0, metadata=NUMBER)
+    attention_slice: int | None = field(default=None, metadata=SIZE)
 
     def __post_init__(self):
         super().__post_init__()

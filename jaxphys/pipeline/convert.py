@@ -9,16 +9,17 @@ import numpy as np
 
 from jaxphys.core.checkpoints import fingerprint
 from jaxphys.core.errors import InputError
+from jaxphys.core.fields import SEED, between, check_number
 from jaxphys.core.files import output_file
 from jaxphys.core.run_folder import run_folder
 from jaxphys.gaussians.gaussians import Gaussians, opacities, scales, to_splats
-from jaxphys.gaussians.ply import read_ply, write_ply
+from jaxphys.gaussians.ply import write_ply
 from jaxphys.gaussians.splat_file import write_splat
 from jaxphys.pipeline.framing import frame_cameras
 from jaxphys.pipeline.video import write_picture
 from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import render
-from jaxphys.scene.scene import View
+from jaxphys.scene.scene import MOST_SPLATS, View
 from jaxphys.scene.source import load
 
 
@@ -40,8 +41,8 @@ def splat_mesh(
     out = Path(out)
     if out.suffix.lower() not in writers:
         raise InputError(f"--out {out}: must end in .ply or .splat")
-    if count < 1:
-        raise InputError(f"--count {count}: must be at least 1")
+    check_number("--count", count, between(1, MOST_SPLATS))
+    check_number("--seed", seed, SEED)
     output_file(out, overwrite=overwrite, inputs=(mesh,))
     writers[out.suffix.lower()](out, load(mesh, count=count, seed=seed))
 
@@ -74,16 +75,12 @@ def render_file(
         InputError: the file cannot be read, a number is out of range, or `out` cannot be written
             (see `output_file` and `run_folder`).
     """
-    for name, value, most in (
-        ("width", width, 8192),
-        ("height", height, 8192),
-        ("views", views, 10_000),
-    ):
-        if not 1 <= value <= most:
-            raise InputError(f"--{name} {value}: must lie between 1 and {most}")
-    if min(background) < 0 or max(background) > 1:
-        raise InputError(f"--background {background}: red, green and blue lie between 0 and 1")
-    gaussians = read_ply(file)
+    check_number("--width", width, between(1, 8192))
+    check_number("--height", height, between(1, 8192))
+    check_number("--views", views, between(1, 10_000))
+    for value in background:
+        check_number("--background", value, between(0, 1))
+    gaussians = load(file)
     out = Path(out)
     single = out.suffix.lower() == ".png"
     if not single and out.suffix:

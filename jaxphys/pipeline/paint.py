@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.fields import SEED, check_number
 from jaxphys.core.files import output_file
 from jaxphys.pipeline.video import write_picture
 
@@ -30,6 +31,10 @@ def paint_file(
     if out.suffix.lower() != ".png":
         raise InputError(f"--out {out}: must end in .png")
     output_file(out, overwrite=overwrite)
-    config = PaintConfig(**settings)
+    check_number("--seed", seed, SEED)
+    try:
+        config = PaintConfig(**settings)
+    except InputError as error:
+        raise InputError(f"--{error}") from None
     folder = image_folder(prior, dtype=config.dtype)
     write_picture(out, paint(prompt, folder, negative=negative, seed=seed, config=config))

@@ -12,7 +12,6 @@ from jaxphys.mpm.boundaries import Rotate as Rotate
 from jaxphys.mpm.boundaries import Translate as Translate
 from jaxphys.mpm.boundaries import Walls as Walls
 
-from .json import read_json as read_json
 from .json import scene_from_json as scene_from_json
 from .json import to_json as to_json
 from .json import write_scene as write_scene

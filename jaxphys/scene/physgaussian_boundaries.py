@@ -1,8 +1,12 @@
-"""The boundary conditions of PhysGaussian's configuration format as ours."""
+"""The boundary conditions of PhysGaussian's configuration format: as its file has them, and each
+as one of ours.
+"""
 
-from typing import Any
+from dataclasses import dataclass, field
+from typing import ClassVar
 
-from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.errors import InputError
+from jaxphys.core.fields import LENGTH, PLACE, SPEED, TIME, between
 from jaxphys.mpm.boundaries import (
     FOREVER,
     AnyBoundary,
@@ -15,130 +19,160 @@ from jaxphys.mpm.boundaries import (
     Translate,
     Walls,
 )
-from jaxphys.scene.reader import Reader
 
-SPAN = {"start_time", "end_time"}
-KEYS = {
-    "bounding_box": set(),
-    "cuboid": {"point", "size", "velocity", "reset"} | SPAN,
-    "particle_impulse": {"force", "start_time", "num_dt", "point", "size"},
-    "enforce_particle_translation": {"point", "size", "velocity"} | SPAN,
-    "surface_collider": {"point", "normal", "surface", "friction"} | SPAN,
-    "release_particles_sequentially": {"normal", "start_position", "end_position", "num_layers"}
-    | SPAN,
-    "enforce_particle_velocity_rotation": (
-        {"normal", "point", "half_height_and_radius", "rotation_scale", "translation_scale"} | SPAN
-    ),
-}
+Vector = tuple[float, float, float]
+FLAG = {"zero_or_one": True}
+MOST_STEPS = between(1, 100_000_000)
 
 
-def _cuboid(read: Reader, substep: float, notes: list[str]) -> Box:
-    resets = read.flag("reset")
-    if resets:
-        notes.append("cuboid reset: theirs then stops the whole grid; here only the box is held")
-    return Box(
-        read.numbers("point", 3),
-        read.numbers("size", 3),
-        read.numbers("velocity", 3),
-        read.number("start_time", 0.0),
-        read.number("end_time", 1e3),
-        15 * substep if resets else 0.0,
-    )
+@dataclass(frozen=True)
+class BoundingBox:
+    """The faces of the grid."""
+
+    type: ClassVar[str] = "bounding_box"
+
+    def ours(self, substep: float, notes: list[str]) -> AnyBoundary:
+        """What it is here; adds to `notes` what differs. So does `ours` of the others."""
+        return Walls(acts_on="nodes")
 
 
-def _impulse(read: Reader, substep: float, notes: list[str]) -> Impulse:
-    notes.append(
-        "particle_impulse: the force is for each particle, so its effect depends on filling"
-    )
-    return Impulse(
-        read.numbers("point", 3, [1, 1, 1]),
-        read.numbers("size", 3, [1, 1, 1]),
-        read.numbers("force", 3),
-        read.number("start_time", 0.0),
-        read.whole("num_dt", 1) * substep,
-        per_particle=True,
-    )
+@dataclass(frozen=True)
+class Cuboid:
+    """A box of the grid that moves."""
+
+    type: ClassVar[str] = "cuboid"
+    point: Vector = field(metadata=PLACE)
+    size: Vector = field(metadata=LENGTH)
+    velocity: Vector = field(metadata=SPEED)
+    start_time: float = field(default=0.0, metadata=TIME)
+    end_time: float = field(default=1e3, metadata=TIME)
+    reset: bool = field(default=False, metadata=FLAG)
+
+    def ours(self, substep: float, notes: list[str]) -> AnyBoundary:
+        if self.reset:
+            notes.append(
+                "cuboid reset: theirs then stops the whole grid; here only the box is held"
+            )
+        rest = 15 * substep if self.reset else 0.0
+        return Box(self.point, self.size, self.velocity, self.start_time, self.end_time, rest)
 
 
-def _translate(read: Reader, substep: float, notes: list[str]) -> Translate:
-    return Translate(
-        read.numbers("point", 3),
-        read.numbers("size", 3),
-        read.numbers("velocity", 3),
-        read.number("start_time"),
-        read.number("end_time"),
-    )
+@dataclass(frozen=True)
+class ParticleImpulse:
+    """A push on the particles of a box."""
 
+    type: ClassVar[str] = "particle_impulse"
+    force: Vector
+    start_time: float = field(default=0.0, metadata=TIME)
+    num_dt: int = field(default=1, metadata=MOST_STEPS)
+    point: Vector = field(default=(1.0, 1.0, 1.0), metadata=PLACE)
+    size: Vector = field(default=(1.0, 1.0, 1.0), metadata=LENGTH)
 
-def _plane(read: Reader, substep: float, notes: list[str]) -> Plane | Cut:
-    surface, friction = read.text("surface", "sticky"), read.number("friction", 0.0)
-    if surface == "sticky" and friction != 0:
-        raise InputError(
-            f"{read.where}.friction: sticky surfaces take friction 0, found {friction}"
+    def ours(self, substep: float, notes: list[str]) -> AnyBoundary:
+        notes.append(
+            "particle_impulse: the force is for each particle, so its effect depends on filling"
         )
-    point, normal = read.numbers("point", 3), read.numbers("normal", 3)
-    start, end = read.number("start_time", 0.0), read.number("end_time", FOREVER)
-    if surface == "cut":
-        notes.append("surface_collider cut: slides along the plane here, along x and z there")
-        return Cut(point, normal, start=start, end=end)
-    if surface != "sticky":
-        notes.append(f"surface_collider {surface}: theirs sticks whatever it says; not so here")
-    kind = surface if surface in ("sticky", "slip") else "separate"
-    return Plane(point, normal, kind, friction, start, end, acts_on="nodes")
+        duration = self.num_dt * substep
+        return Impulse(
+            self.point, self.size, self.force, self.start_time, duration, per_particle=True
+        )
 
 
-def _release(read: Reader, substep: float, notes: list[str]) -> Release:
-    read.whole("num_layers", 50)
-    notes.append("release_particles_sequentially: 50 layers there, one continuous sweep here")
-    return Release(
-        read.numbers("normal", 3),
-        read.number("start_position"),
-        read.number("end_position"),
-        read.number("start_time"),
-        read.number("end_time"),
-    )
+@dataclass(frozen=True)
+class ParticleTranslation:
+    """The particles of a box move at one velocity."""
+
+    type: ClassVar[str] = "enforce_particle_translation"
+    point: Vector = field(metadata=PLACE)
+    size: Vector = field(metadata=LENGTH)
+    velocity: Vector = field(metadata=SPEED)
+    start_time: float = field(metadata=TIME)
+    end_time: float = field(metadata=TIME)
+
+    def ours(self, substep: float, notes: list[str]) -> AnyBoundary:
+        return Translate(self.point, self.size, self.velocity, self.start_time, self.end_time)
 
 
-def _rotate(read: Reader, substep: float, notes: list[str]) -> Rotate:
-    half_height, radius = read.numbers("half_height_and_radius", 2)
-    return Rotate(
-        read.numbers("point", 3),
-        read.numbers("normal", 3),
-        half_height,
-        radius,
-        # By the left hand: theirs is v = -scale n x r.
-        -read.number("rotation_scale"),
-        read.number("translation_scale"),
-        read.number("start_time"),
-        read.number("end_time"),
-    )
+@dataclass(frozen=True)
+class SurfaceCollider:
+    """A half-space."""
+
+    type: ClassVar[str] = "surface_collider"
+    point: Vector = field(metadata=PLACE)
+    normal: Vector = field(metadata=PLACE)
+    surface: str = "sticky"
+    friction: float = field(default=0.0, metadata=between(0, 1e6))
+    start_time: float = field(default=0.0, metadata=TIME)
+    end_time: float = field(default=FOREVER, metadata=TIME)
+
+    def __post_init__(self):
+        if self.surface == "sticky" and self.friction != 0:
+            raise InputError(f"friction: sticky surfaces take friction 0, found {self.friction}")
+
+    def ours(self, substep: float, notes: list[str]) -> AnyBoundary:
+        start, end = self.start_time, self.end_time
+        if self.surface == "cut":
+            notes.append("surface_collider cut: slides along the plane here, along x and z there")
+            return Cut(self.point, self.normal, start=start, end=end)
+        if self.surface != "sticky":
+            notes.append(
+                f"surface_collider {self.surface}: theirs sticks whatever it says; not so here"
+            )
+        kind = self.surface if self.surface in ("sticky", "slip") else "separate"
+        return Plane(self.point, self.normal, kind, self.friction, start, end, acts_on="nodes")
 
 
-def _walls(read: Reader, substep: float, notes: list[str]) -> Walls:
-    return Walls(acts_on="nodes")
+@dataclass(frozen=True)
+class ReleaseSequentially:
+    """Particles are let go layer by layer."""
+
+    type: ClassVar[str] = "release_particles_sequentially"
+    normal: Vector = field(metadata=PLACE)
+    start_position: float = field(metadata=PLACE)
+    end_position: float = field(metadata=PLACE)
+    start_time: float = field(metadata=TIME)
+    end_time: float = field(metadata=TIME)
+    num_layers: int = field(default=50, metadata=MOST_STEPS)
+
+    def ours(self, substep: float, notes: list[str]) -> AnyBoundary:
+        notes.append("release_particles_sequentially: 50 layers there, one continuous sweep here")
+        return Release(
+            self.normal, self.start_position, self.end_position, self.start_time, self.end_time
+        )
 
 
-READERS = {
-    "bounding_box": _walls,
-    "cuboid": _cuboid,
-    "particle_impulse": _impulse,
-    "enforce_particle_translation": _translate,
-    "surface_collider": _plane,
-    "release_particles_sequentially": _release,
-    "enforce_particle_velocity_rotation": _rotate,
-}
+@dataclass(frozen=True)
+class VelocityRotation:
+    """The particles of a cylinder turn about its axis."""
+
+    type: ClassVar[str] = "enforce_particle_velocity_rotation"
+    normal: Vector = field(metadata=PLACE)
+    point: Vector = field(metadata=PLACE)
+    half_height_and_radius: tuple[float, float] = field(metadata=LENGTH)
+    rotation_scale: float = field(metadata=between(-1e6, 1e6))
+    translation_scale: float = field(metadata=SPEED)
+    start_time: float = field(metadata=TIME)
+    end_time: float = field(metadata=TIME)
+
+    def ours(self, substep: float, notes: list[str]) -> AnyBoundary:
+        return Rotate(
+            self.point,
+            self.normal,
+            *self.half_height_and_radius,
+            # By the left hand: theirs is v = -scale n x r.
+            -self.rotation_scale,
+            self.translation_scale,
+            self.start_time,
+            self.end_time,
+        )
 
 
-def read_boundary(value: Any, where: str, substep: float, notes: list[str]) -> AnyBoundary:
-    """One entry of `boundary_conditions`; adds to `notes` what differs from PhysGaussian."""
-    if not isinstance(value, dict) or not isinstance(value.get("type"), str):
-        raise InputError(f"{where}: expected an object with a key 'type'; valid: {', '.join(KEYS)}")
-    name = value["type"]
-    if name not in KEYS:
-        raise InputError(f"{where}.type: unknown boundary {name!r}; {nearest(name, KEYS)}")
-    read = Reader(value, KEYS[name] | {"type"}, where)
-    try:
-        return READERS[name](read, substep, notes)
-    except InputError as error:
-        message = str(error)
-        raise InputError(message if message.startswith(where) else f"{where}.{message}") from None
+Condition = (
+    BoundingBox
+    | Cuboid
+    | ParticleImpulse
+    | ParticleTranslation
+    | SurfaceCollider
+    | ReleaseSequentially
+    | VelocityRotation
+)

@@ -9,10 +9,23 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from jaxphys.core.errors import InputError
-from jaxphys.core.fields import NON_NEGATIVE, POSITIVE, Checked, between
+from jaxphys.core.fields import (
+    DURATION,
+    LENGTH,
+    PLACE,
+    SEED,
+    SPEED,
+    Checked,
+    between,
+)
 from jaxphys.mpm.boundaries import AnyBoundary, Vector
 
 Area = tuple[float, float, float, float, float, float]
+
+ANGLE = between(-1e6, 1e6)
+RATE = between(-1e6, 1e6)
+MOST_SPLATS = 20_000_000
+MOST_NODES = 512**3
 
 
 @dataclass(frozen=True)
@@ -24,8 +37,8 @@ class Rotation(Checked):
         degrees: right-handed.
     """
 
-    axis: Vector
-    degrees: float
+    axis: Vector = field(metadata=PLACE)
+    degrees: float = field(metadata=ANGLE)
 
 
 @dataclass(frozen=True)
@@ -37,8 +50,8 @@ class Region(Checked):
         parameters: by name, as `jaxphys materials` lists them.
     """
 
-    centre: Vector
-    half_size: Vector = field(metadata=POSITIVE)
+    centre: Vector = field(metadata=PLACE)
+    half_size: Vector = field(metadata=LENGTH)
     parameters: dict[str, float] = field(default_factory=dict)
 
 
@@ -63,15 +76,15 @@ class Filling(Checked):
             that come apart.
     """
 
-    spacing: float | None = field(default=None, metadata=POSITIVE)
-    density_threshold: float | None = field(default=None, metadata=NON_NEGATIVE)
-    search_threshold: float | None = field(default=None, metadata=NON_NEGATIVE)
+    spacing: float | None = field(default=None, metadata=LENGTH)
+    density_threshold: float | None = field(default=None, metadata=between(0, 1e9))
+    search_threshold: float | None = field(default=None, metadata=between(0, 1e9))
     search_count: int = field(default=6, metadata=between(0, 6))
     exclude_direction: int = field(default=-1, metadata=between(-1, 5))
     ray_direction: int = field(default=-1, metadata=between(-1, 5))
-    per_cell: int = field(default=1, metadata=POSITIVE)
-    maximum: int = field(default=500_000, metadata=POSITIVE)
-    area: Area | None = None
+    per_cell: int = field(default=1, metadata=between(1, 1000))
+    maximum: int = field(default=500_000, metadata=between(1, 100_000_000))
+    area: Area | None = field(default=None, metadata=PLACE)
     smooth: bool = False
     relax: bool = False
     show: bool = False
@@ -105,15 +118,15 @@ class Object(Checked):
     law: str | None = None
     parameters: dict[str, float] = field(default_factory=dict)
     regions: tuple[Region, ...] = ()
-    size: float = field(default=1.0, metadata=POSITIVE)
-    centre: Vector = (1.25, 1.25, 1.0)
+    size: float = field(default=1.0, metadata=LENGTH)
+    centre: Vector = field(default=(1.25, 1.25, 1.0), metadata=PLACE)
     rotation: tuple[Rotation, ...] = ()
-    velocity: Vector = (0.0, 0.0, 0.0)
-    spin: Vector = (0.0, 0.0, 0.0)
+    velocity: Vector = field(default=(0.0, 0.0, 0.0), metadata=SPEED)
+    spin: Vector = field(default=(0.0, 0.0, 0.0), metadata=RATE)
     opacity_threshold: float = field(default=0.02, metadata=between(0, 1))
-    area: Area | None = None
+    area: Area | None = field(default=None, metadata=PLACE)
     filling: Filling | None = field(default_factory=Filling)
-    splats: int = field(default=20_000, metadata=POSITIVE)
+    splats: int = field(default=20_000, metadata=between(1, MOST_SPLATS))
 
 
 @dataclass(frozen=True)
@@ -126,8 +139,8 @@ class Domain(Checked):
         spacing: of the grid [m].
     """
 
-    size: Vector = field(default=(2.5, 2.5, 2.0), metadata=POSITIVE)
-    spacing: float = field(default=1 / 32, metadata=POSITIVE)
+    size: Vector = field(default=(2.5, 2.5, 2.0), metadata=LENGTH)
+    spacing: float = field(default=1 / 32, metadata=LENGTH)
 
     def __post_init__(self):
         super().__post_init__()
@@ -136,7 +149,7 @@ class Domain(Checked):
                 f"size: {self.size} holds fewer than 8 nodes a side at spacing {self.spacing}; "
                 "make the domain larger or the spacing finer"
             )
-        if self.shape[0] * self.shape[1] * self.shape[2] > 512**3:
+        if math.prod(self.shape) > MOST_NODES:
             raise InputError(
                 f"spacing: {self.spacing} makes a grid of {'x'.join(map(str, self.shape))} nodes, "
                 "more than 512x512x512; make it coarser"
@@ -164,14 +177,14 @@ class View(Checked):
         approach: change of distance [m/s].
     """
 
-    azimuth: float = -60.0
+    azimuth: float = field(default=-60.0, metadata=ANGLE)
     elevation: float = field(default=14.0, metadata=between(-89.9, 89.9))
-    distance: float | None = field(default=None, metadata=POSITIVE)
-    target: Vector | None = None
+    distance: float | None = field(default=None, metadata=LENGTH)
+    target: Vector | None = field(default=None, metadata=PLACE)
     field_of_view: float = field(default=35.0, metadata=between(1.0, 150.0))
-    turn: float = 0.0
-    rise: float = 0.0
-    approach: float = 0.0
+    turn: float = field(default=0.0, metadata=RATE)
+    rise: float = field(default=0.0, metadata=RATE)
+    approach: float = field(default=0.0, metadata=SPEED)
 
 
 @dataclass(frozen=True)
@@ -184,7 +197,7 @@ class Ground(Checked):
         shadow: darkness of the soft shadow under what is near the floor, in [0, 1].
     """
 
-    height: float = 0.1
+    height: float = field(default=0.1, metadata=PLACE)
     colour: Vector = field(default=(0.86, 0.86, 0.85), metadata=between(0, 1))
     shadow: float = field(default=0.45, metadata=between(0, 1))
 
@@ -207,14 +220,14 @@ class Generation(Checked):
     """
 
     prompt: str
-    steps: int | None = field(default=None, metadata=NON_NEGATIVE)
-    splats: int | None = field(default=None, metadata=POSITIVE)
+    steps: int | None = field(default=None, metadata=between(0, 1_000_000))
+    splats: int | None = field(default=None, metadata=between(1, MOST_SPLATS))
     prior: str = "bundled"
     shape_prior: str = "bundled"
     negative: str = ""
     refiner: Literal["auto", "endpoint", "local", "rules"] = "auto"
     precision: Literal["bfloat16", "float32"] = "bfloat16"
-    attention_slice: int | None = field(default=1024, metadata=POSITIVE)
+    attention_slice: int | None = field(default=1024, metadata=between(1, 1_000_000))
 
 
 @dataclass(frozen=True)
@@ -245,14 +258,14 @@ class Scene(Checked):
     """
 
     objects: tuple[Object, ...] = (Object(),)
-    gravity: Vector = (0.0, 0.0, -9.81)
+    gravity: Vector = field(default=(0.0, 0.0, -9.81), metadata=between(-1e6, 1e6))
     boundaries: tuple[AnyBoundary, ...] = ()
     domain: Domain = Domain()
-    damping: float = field(default=0.0, metadata=NON_NEGATIVE)
+    damping: float = field(default=0.0, metadata=between(0, 1e12))
     frames: int = field(default=48, metadata=between(1, 100_000))
     fps: float = field(default=24.0, metadata=between(0.1, 1000.0))
-    frame_time: float | None = field(default=None, metadata=POSITIVE)
-    substep: float | None = field(default=None, metadata=POSITIVE)
+    frame_time: float | None = field(default=None, metadata=between(1e-9, 1e6))
+    substep: float | None = field(default=None, metadata=DURATION)
     unsafe_substep: bool = False
     camera: View = View()
     width: int = field(default=1958, metadata=between(8, 8192))
@@ -261,7 +274,7 @@ class Scene(Checked):
     ground: Ground | None = None
     splats_follow: Literal["total", "elastic"] = "total"
     regularise_colours: bool = True
-    seed: int = field(default=0, metadata=between(0, 2**31 - 1))
+    seed: int = field(default=0, metadata=SEED)
     generation: Generation | None = None
 
     def __post_init__(self):

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.reading import reading
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.gaussians.ply import read_ply
 from jaxphys.scene.scene import Object
@@ -47,12 +48,16 @@ def load(path: str | Path, *, count: int = 20_000, seed: int = 0) -> Gaussians:
     if not path.exists():
         raise InputError(f"{path}: no such file")
     if suffix == ".ply":
-        return read_ply(path)
+        gaussians = read_ply(path)
+        if not gaussians.count:
+            raise InputError(f"{path}: holds no Gaussians; export it again")
+        return gaussians
     if suffix in MESHES:
         from jaxphys.gaussians.mesh import load_mesh
         from jaxphys.gaussians.surface import gaussians_from_mesh
 
-        return gaussians_from_mesh(load_mesh(path), count, seed)
+        with reading(path):
+            return gaussians_from_mesh(load_mesh(path), count, seed)
     raise InputError(
         f"{path}: neither splats (.ply) nor a mesh ({', '.join(MESHES)}); convert it to one"
     )

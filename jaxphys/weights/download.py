@@ -18,7 +18,7 @@ from urllib.parse import urljoin
 
 from tqdm import tqdm
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, one_line
 from jaxphys.core.files import atomic_path
 from jaxphys.weights.catalogue import Entry, File
 from jaxphys.weights.places import hub_cache
@@ -82,7 +82,7 @@ def from_hub(
                 endpoint=endpoint,
             )
         except Exception as error:  # its own, its HTTP library's and the system's
-            refusals.append(f"{repository}: {' '.join(str(error).split()) or error!r}")
+            refusals.append(f"{repository}: {one_line(str(error) or repr(error), 120)}")
             continue
         if wrong := _accept(files, incoming, folder):
             refusals.append(f"{repository}: {wrong}")

@@ -7,11 +7,9 @@ file's end, because the `gguf` package trusts lengths and takes seconds for a vo
 package's part is what the types of quantised blocks mean.
 """
 
-from __future__ import annotations
-
+import math
 import mmap
 import re
-import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, shown
+from jaxphys.core.finite import all_finite
+from jaxphys.core.reading import reading
 
 MAGIC = b"GGUF"
 VERSIONS = (2, 3)
@@ -141,11 +141,11 @@ class _Arrays(Mapping[str, np.ndarray]):
             array = dequantize(rows, entry.kind)
         except (ValueError, NotImplementedError):
             raise InputError(
-                f"{self.path}: array {name!r} of type {entry.kind.name} and shape {entry.shape}"
-                " cannot be read"
+                f"{self.path}: array {shown(name)} of type {entry.kind.name} and shape"
+                f" {entry.shape} cannot be read"
             ) from None
-        if not np.isfinite(array).all():
-            raise InputError(f"{self.path}: array {name!r} holds numbers that are not finite")
+        if not all_finite(array):
+            raise InputError(f"{self.path}: array {shown(name)} holds numbers that are not finite")
         for pattern, keys in HEADS:
             if re.search(pattern, name):
                 key = next((key for key in keys if key in self.metadata), keys[0])
@@ -158,7 +158,7 @@ def _rows_in_order(array: np.ndarray, heads: int, field: str) -> np.ndarray:
     instead of half a head apart.
     """
     if not isinstance(heads, int) or heads < 1 or array.shape[0] % (2 * heads):
-        raise InputError(f"{field}: {heads!r} does not fit {array.shape[0]} rows")
+        raise InputError(f"{field}: {shown(heads)} does not fit {array.shape[0]} rows")
     pairs = array.reshape(heads, -1, 2, *array.shape[1:])
     return pairs.swapaxes(1, 2).reshape(array.shape)
 
@@ -169,7 +169,6 @@ def read_gguf(path: str | Path) -> GGUFFile:
     Raises:
         InputError: the file is missing, damaged or of another kind, or `gguf` is not installed.
     """
-    path = Path(path)
     try:
         import gguf
     except ModuleNotFoundError:
@@ -177,16 +176,16 @@ def read_gguf(path: str | Path) -> GGUFFile:
             f"{path}: reading GGUF files needs the package gguf;"
             " pip install 'jaxphys-splats[models]'"
         ) from None
-    try:
+    with reading(path) as path:
         with path.open("rb") as file:
+            if not path.stat().st_size:
+                raise InputError(f"{path}: is empty; give a .gguf file")
             data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-    except (OSError, ValueError) as error:  # ValueError: an empty file
-        raise InputError(f"{path}: cannot be read ({error}); give a .gguf file") from None
-    try:
-        metadata, entries = _walk(_Header(data), gguf)
-    except (_Damaged, struct.error) as problem:
-        raise InputError(f"{path}: is no usable GGUF file: {problem}; get it again") from None
-    return GGUFFile(path, metadata, _Arrays(path, data, entries, metadata))
+        try:
+            metadata, entries = _walk(_Header(data), gguf)
+        except _Damaged as problem:
+            raise InputError(f"{path}: is no usable GGUF file: {problem}; get it again") from None
+        return GGUFFile(path, metadata, _Arrays(path, data, entries, metadata))
 
 
 def _walk(header: _Header, gguf: Any) -> tuple[dict[str, Any], dict[str, _Entry]]:
@@ -200,36 +199,36 @@ def _walk(header: _Header, gguf: Any) -> tuple[dict[str, Any], dict[str, _Entry]
     for _ in range(entries):
         name = header.string()
         if name in metadata:
-            raise _Damaged(f"metadata {name!r} is there twice")
+            raise _Damaged(f"metadata {shown(name)} is there twice")
         metadata[name] = header.value()
     infos = [_array_info(header, gguf) for _ in range(arrays)]
     alignment = metadata.get("general.alignment", ALIGNMENT)
     if not isinstance(alignment, int) or alignment < 1:
-        raise _Damaged(f"general.alignment: {alignment!r}")
+        raise _Damaged(f"general.alignment: {shown(alignment)}")
     first = -(-header.offset // alignment) * alignment
     found = {}
     for name, shape, kind, offset in infos:
         for pattern, replacement in RENAMES:
             name = re.sub(pattern, replacement, name)
         if name in found:
-            raise _Damaged(f"array {name!r} is there twice")
-        block, size = gguf.GGML_QUANT_SIZES[kind]
-        entry = _Entry(
-            shape, kind, first + offset, int(np.prod(shape, dtype=object)) // block * size
-        )
+            raise _Damaged(f"array {shown(name)} is there twice")
+        block, size = gguf.GGML_QUANT_SIZES.get(kind, (0, 0))
+        if not block or shape[-1] % block:
+            raise _Damaged(f"array {shown(name)} of shape {shape} cannot be of type {kind.name}")
+        entry = _Entry(shape, kind, first + offset, math.prod(shape) // block * size)
         if entry.start + entry.size > len(header.data):
-            raise _Damaged(f"array {name!r} lies beyond its end")
+            raise _Damaged(f"array {shown(name)} lies beyond its end")
         found[name] = entry
     return metadata, found
 
 
 def _array_info(header: _Header, gguf: Any) -> tuple[str, tuple[int, ...], Any, int]:
     name, dimensions = header.string(), header.scalar("<u4")
-    if dimensions > MOST_DIMENSIONS:
-        raise _Damaged(f"array {name!r} has {dimensions} dimensions")
+    if not 1 <= dimensions <= MOST_DIMENSIONS:
+        raise _Damaged(f"array {shown(name)} has {dimensions} dimensions")
     shape = tuple(header.scalar("<u8") for _ in range(dimensions))[::-1]
     code, offset = header.scalar("<u4"), header.scalar("<u8")
     try:
         return name, shape, gguf.GGMLQuantizationType(code), offset
     except ValueError:
-        raise _Damaged(f"array {name!r} is of the unknown type {code}") from None
+        raise _Damaged(f"array {shown(name)} is of the unknown type {code}") from None

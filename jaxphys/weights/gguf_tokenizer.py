@@ -1,13 +1,11 @@
 """The tokenizer that a GGUF file holds in its metadata, as one of the `tokenizers` package."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
 from tokenizers import AddedToken, Tokenizer, decoders, models, pre_tokenizers
 
-from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.errors import InputError, nearest, shown
 
 CONTROL, USER_DEFINED = 3, 4  # types of tokens that are never made of merges
 
@@ -36,11 +34,11 @@ def tokenizer_from_gguf(metadata: Mapping[str, Any], source: str) -> Tokenizer:
     model, cut = (metadata.get(f"tokenizer.ggml.{name}") for name in ("model", "pre"))
     if model != "gpt2":
         raise InputError(
-            f"{source}: tokenizer.ggml.model: {model!r} is not supported, only 'gpt2'; give the"
-            " folder with tokenizer.json that the file was made from"
+            f"{source}: tokenizer.ggml.model: {shown(model)} is not supported, only 'gpt2'; give"
+            " the folder with tokenizer.json that the file was made from"
         )
     if cut not in CUTS:
-        raise InputError(f"{source}: tokenizer.ggml.pre: {cut!r}; {nearest(str(cut), CUTS)}")
+        raise InputError(f"{source}: tokenizer.ggml.pre: {shown(cut)}; {nearest(str(cut), CUTS)}")
     tokens, types, merges = (
         metadata.get(f"tokenizer.ggml.{name}") for name in ("tokens", "token_type", "merges")
     )
@@ -56,7 +54,7 @@ def tokenizer_from_gguf(metadata: Mapping[str, Any], source: str) -> Tokenizer:
     for pair in pairs:
         if len(pair) != 2 or not {*pair, "".join(pair)} <= vocabulary.keys():
             raise InputError(
-                f"{source}: tokenizer.ggml.merges: {' '.join(pair)!r} does not join two tokens"
+                f"{source}: tokenizer.ggml.merges: {shown(' '.join(pair))} does not join two tokens"
             )
     tokenizer = Tokenizer(models.BPE(vocab=vocabulary, merges=pairs))
     tokenizer.pre_tokenizer = CUTS[cut]()

@@ -17,6 +17,7 @@ from jaxphys.weights.places import (
     stand_in,
 )
 
+LONGEST = 1500  # a network may have a dozen files, and each must be named
 OFFLINE = ("1", "on", "true", "yes")
 
 
@@ -57,7 +58,7 @@ def locate(
     if not lacking:
         return folder
     if not fetch:
-        raise InputError(_absent(entry, parts, environment, "nothing was fetched"))
+        raise _absent(entry, parts, environment, "nothing was fetched")
     return _fetched(entry, parts, environment, half)
 
 
@@ -87,7 +88,7 @@ def _fetched(
     entry: Entry, parts: Sequence[str] | None, environment: Mapping[str, str], half: bool
 ) -> Path:
     if _offline(environment):
-        raise InputError(_absent(entry, parts, environment, "HF_HUB_OFFLINE forbids the network"))
+        raise _absent(entry, parts, environment, "HF_HUB_OFFLINE forbids the network")
     folder = own_folder(entry, environment)
     try:
         if entry.repositories:
@@ -98,10 +99,10 @@ def _fetched(
         else:
             from_urls(missing(folder, entry, parts), folder)
     except (InputError, OSError) as error:
-        raise InputError(_absent(entry, parts, environment, str(error))) from error
+        raise _absent(entry, parts, environment, str(error)) from error
     if missing(folder, entry, parts):
         reason = f"{folder} was fetched, but is incomplete"
-        raise InputError(_absent(entry, parts, environment, reason))
+        raise _absent(entry, parts, environment, reason)
     return folder
 
 
@@ -115,14 +116,15 @@ def _offline(environment: Mapping[str, str]) -> bool:
 
 def _absent(
     entry: Entry, parts: Sequence[str] | None, environment: Mapping[str, str], reason: str
-) -> str:
+) -> InputError:
     """One line: what is missing, whose it is, where it is published and where it belongs."""
     folder = own_folder(entry, environment)
-    return (
+    return InputError(
         f"weights {entry.name!r} are not on this computer ({reason}):"
         f" missing {_listed(missing(folder, entry, parts))}; licence {entry.licence}."
         f" {_source(entry)}; put them into {folder} (${VARIABLE} names another parent), or run"
-        f" `jaxphys weights fetch {entry.name}` where there is a network"
+        f" `jaxphys weights fetch {entry.name}` where there is a network",
+        longest=LONGEST,
     )
 
 

@@ -1,9 +1,8 @@
 """The arrays of published networks: one .safetensors file, or a folder that holds them.
 
-Folders come in three forms: one whole file, the same at half precision, or shards with an index.
+Folders come in four forms: one whole file or shards with an index, each at full or half precision.
 """
 
-import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -11,9 +10,18 @@ import ml_dtypes  # noqa: F401  (gives numpy its bfloat16)
 import numpy as np
 from safetensors import SafetensorError, safe_open
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, shown
+from jaxphys.core.files import read_json
+from jaxphys.core.finite import all_finite
+from jaxphys.core.reading import reading
 
 TYPES = ("F32", "F16", "BF16", "F64", "I64", "I32", "I16", "I8", "U8", "BOOL")
+ENDINGS = (
+    "safetensors",
+    "safetensors.index.json",
+    "fp16.safetensors",
+    "safetensors.index.fp16.json",
+)
 REMEDY = "put the original file there (`jaxphys weights list` names where it is published)"
 
 
@@ -31,15 +39,23 @@ class Arrays(Mapping[str, np.ndarray]):
             for name in opened.keys():  # noqa: SIM118 (no mapping)
                 if name in self._sources:
                     other = self._sources[name][0].name
-                    raise InputError(f"{path}: array {name!r} is also in {other}; {REMEDY}")
+                    raise InputError(f"{path}: array {shown(name)} is also in {other}; {REMEDY}")
                 self._sources[name] = (path, opened)
 
     def __getitem__(self, name: str) -> np.ndarray:
         path, opened = self._sources[name]
         kind = opened.get_slice(name).get_dtype()
         if kind not in TYPES:
-            raise InputError(f"{path}: array {name!r} holds {kind}; readable: {', '.join(TYPES)}")
-        return opened.get_tensor(name)
+            raise InputError(
+                f"{path}: array {shown(name)} holds {kind}; readable: {', '.join(TYPES)}"
+            )
+        with reading(path):
+            array = opened.get_tensor(name)
+        if not all_finite(array):
+            raise InputError(
+                f"{path}: array {shown(name)} holds numbers that are not finite; {REMEDY}"
+            )
+        return array
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._sources)
@@ -56,8 +72,9 @@ def open_arrays(path: str | Path, stem: str = "model") -> Arrays:
     """The arrays of a .safetensors file, or of a folder with the files of one network.
 
     Args:
-        path: the file; or a folder with {stem}.safetensors, else {stem}.safetensors.index.json and
-            the shards that it lists, else {stem}.fp16.safetensors.
+        path: the file, or an index of shards; or a folder with {stem}.safetensors, else
+            {stem}.safetensors.index.json and the shards that it lists, else
+            {stem}.fp16.safetensors, else {stem}.safetensors.index.fp16.json and its shards.
         stem: the files' name in a folder: "model", or "diffusion_pytorch_model" for parts of
             Stable Diffusion.
 
@@ -66,22 +83,19 @@ def open_arrays(path: str | Path, stem: str = "model") -> Arrays:
     """
     path = Path(path)
     if not path.is_dir():
-        return Arrays([path])
+        return _sharded(path) if path.suffix == ".json" else Arrays([path])
     found = choices(path, stem)
     if not found:
         raise InputError(
-            f"{path}: the folder has no {stem}.safetensors (nor {stem}.safetensors.index.json, nor"
-            f" {stem}.fp16.safetensors); other kinds of files are not read; {REMEDY}"
+            f"{path}: the folder has no {stem}.safetensors (nor {' nor '.join(ENDINGS[1:])} of that"
+            f" name); other kinds of files are not read; {REMEDY}"
         )
-    if found[0].suffix == ".json":
-        return _sharded(found[0])
-    return Arrays([found[0]])
+    return open_arrays(found[0])
 
 
 def choices(folder: Path, stem: str = "model") -> list[Path]:
-    """What a folder has of the three forms, the best first; of shards, their index."""
-    endings = ("safetensors", "safetensors.index.json", "fp16.safetensors")
-    return [file for ending in endings if (file := folder / f"{stem}.{ending}").is_file()]
+    """What a folder has of the four forms, the best first; of shards, their index."""
+    return [file for ending in ENDINGS if (file := folder / f"{stem}.{ending}").is_file()]
 
 
 def shards(index: Path) -> dict[str, str]:
@@ -90,16 +104,17 @@ def shards(index: Path) -> dict[str, str]:
     Raises InputError if it is no such index, or names a file outside of its own folder.
     """
     try:
-        listed = json.loads(index.read_text(encoding="utf-8"))["weight_map"]
-    except (OSError, ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError(f"{index}: not an index of shards ({error!r}); {REMEDY}") from error
+        listed = read_json(index).get("weight_map")
+    except InputError as error:
+        why = str(error).removeprefix(f"{index}: ")
+        raise InputError(f"{index}: not an index of shards ({why}); {REMEDY}") from error
     if not isinstance(listed, dict) or not listed:
         raise InputError(f"{index}: 'weight_map' lists no arrays; {REMEDY}")
     for name, file in listed.items():
         if not isinstance(file, str) or not file.endswith(".safetensors"):
-            raise InputError(f"{index}: array {name!r} is in no .safetensors file; {REMEDY}")
+            raise InputError(f"{index}: array {shown(name)} is in no .safetensors file; {REMEDY}")
         if Path(file).name != file or "\\" in file:
-            raise InputError(f"{index}: {file!r} is not a file of the same folder; {REMEDY}")
+            raise InputError(f"{index}: {shown(file)} is not a file of the same folder; {REMEDY}")
     return listed
 
 
@@ -111,7 +126,7 @@ def _sharded(index: Path) -> Arrays:
         found = arrays.path(name).name if name in arrays else "no shard"
         if listed.get(name) != found:
             raise InputError(
-                f"{index}: array {name!r} is in {found}, but listed in"
+                f"{index}: array {shown(name)} is in {found}, but listed in"
                 f" {listed.get(name, 'no shard')}; {REMEDY}"
             )
     return arrays
@@ -122,7 +137,8 @@ def _open(path: Path) -> safe_open:
     if not path.is_file():
         what = "is not a file" if path.exists() else "is missing"
         raise InputError(f"{path}: {what}; {REMEDY}")
-    try:
-        return safe_open(path, framework="numpy")
-    except (SafetensorError, OSError) as error:
-        raise InputError(f"{path}: not a whole safetensors file ({error}); {REMEDY}") from error
+    with reading(path):
+        try:
+            return safe_open(path, framework="numpy")
+        except (SafetensorError, OSError) as error:
+            raise InputError(f"{path}: not a whole safetensors file ({error}); {REMEDY}") from error

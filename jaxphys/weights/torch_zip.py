@@ -18,7 +18,9 @@ from typing import NamedTuple
 import ml_dtypes
 import numpy as np
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, shown
+from jaxphys.core.finite import all_finite
+from jaxphys.core.reading import reading
 
 ZIP, PICKLE = b"PK\x03\x04", b"\x80"
 LARGEST_PICKLE = 4 * 1024**2
@@ -79,20 +81,21 @@ def read_torch_zip(path: str | Path) -> dict[str, np.ndarray]:
         InputError: the file is missing, damaged, not of this kind, or holds anything but
             dictionaries, tensors and plain values.
     """
-    path = Path(path)
-    try:
-        with path.open("rb") as file:
+    with reading(path) as path, path.open("rb") as file:
+        try:
             _check_kind(file.read(4))
             with zipfile.ZipFile(file) as archive:
-                return dict(_tensors(_Archive(archive, path.stat().st_size).value()))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (*FOREIGN, NotImplementedError, RuntimeError) as error:
-        reason = str(error) if isinstance(error, InputError) else f"it is damaged ({error!r})"
-        raise InputError(
-            f"{path}: not readable as PyTorch weights: {reason}; nothing was run. Put the original"
-            " file there, or save its tensors as .safetensors"
-        ) from error
+                tensors = dict(_tensors(_Archive(archive, path.stat().st_size).value()))
+        except (*FOREIGN, NotImplementedError, RuntimeError) as error:
+            reason = str(error) if isinstance(error, InputError) else f"it is damaged ({error!r})"
+            raise InputError(
+                f"{path}: not readable as PyTorch weights: {reason}; nothing was run. Put the"
+                " original file there, or save its tensors as .safetensors"
+            ) from error
+        for name, tensor in tensors.items():
+            if not all_finite(tensor):
+                raise InputError(f"{path}: tensor {shown(name)} holds numbers that are not finite")
+        return tensors
 
 
 def _check_kind(start: bytes) -> None:
@@ -119,7 +122,7 @@ class _Archive:
             raise InputError("it is a TorchScript program and not a dictionary of tensors")
         for member in self.members.values():
             if member.compress_type != zipfile.ZIP_STORED or member.flag_bits & 1:
-                raise InputError(f"its member {_shown(member.filename)} is compressed or encrypted")
+                raise InputError(f"its member {shown(member.filename)} is compressed or encrypted")
         if sum(member.file_size for member in self.members.values()) > size:
             raise InputError("its members claim to be larger than the file")
         self.swapped = False
@@ -133,9 +136,9 @@ class _Archive:
     def read(self, name: str, *, largest: int | None = None) -> bytes:
         name = f"{self.root}/{name}"
         if name not in self.members:
-            raise InputError(f"it lacks its member {_shown(name)}")
+            raise InputError(f"it lacks its member {shown(name)}")
         if largest is not None and self.members[name].file_size > largest:
-            raise InputError(f"its member {_shown(name)} is larger than {largest} bytes")
+            raise InputError(f"its member {shown(name)} is larger than {largest} bytes")
         return self.archive.read(name)
 
     def value(self) -> object:
@@ -150,7 +153,7 @@ class _Archive:
             case _:
                 raise InputError(f"it wants an external object that is no storage{_of(identity)}")
         if not (key.isascii() and key.isdecimal()):
-            raise InputError(f"its storage {_shown(key)} is not named by a number")
+            raise InputError(f"its storage {shown(key)} is not named by a number")
         if key not in self.storages:
             content = self.read(f"data/{key}")
             if self.swapped:
@@ -210,7 +213,7 @@ def _run(pickle: bytes, storage) -> object:
             _append(stack[-1], [item])
         elif name == "GLOBAL":
             if argument not in (ORDERED_DICT, TENSOR, PARAMETER, *STORAGES):
-                raise InputError(f"it wants the global {_shown(argument)}, which no tensor needs")
+                raise InputError(f"it wants the global {shown(argument)}, which no tensor needs")
             stack.append(Global(argument))
         elif name == "BINPERSID":
             stack.append(storage(stack.pop()))
@@ -257,7 +260,7 @@ def _call(function: object, arguments: object) -> object:
         case Global(name), (np.ndarray(), bool(), {}) if name == PARAMETER:
             return arguments[0]
         case Global(name), _:
-            raise InputError(f"it calls {_shown(name)} with arguments of other kinds")
+            raise InputError(f"it calls {shown(name)} with arguments of other kinds")
     raise InputError(f"it calls something{_of(function)}")
 
 
@@ -298,10 +301,10 @@ def _tensors(value: object) -> Iterator[tuple[str, np.ndarray]]:
     while waiting:
         name, value = waiting.pop()
         if len(name) > LONGEST_NAME:
-            raise InputError(f"it has a name of {len(name)} characters, {_shown(name)}")
+            raise InputError(f"it has a name of {len(name)} characters, {shown(name)}")
         if isinstance(value, np.ndarray):
             if name in names:
-                raise InputError(f"two of its tensors are named {_shown(name)}")
+                raise InputError(f"two of its tensors are named {shown(name)}")
             names.add(name)
             yield name, value
         elif type(value) is dict:
@@ -315,14 +318,10 @@ def _tensors(value: object) -> Iterator[tuple[str, np.ndarray]]:
 def _of(value: object) -> str:
     """Tells the kind of a value only: nested tuples may be far too long to print."""
     if isinstance(value, Global):
-        return f" ({_shown(value.name)})"
+        return f" ({shown(value.name)})"
     return f" (a {type(value).__name__})"
 
 
 def _number(value: object) -> str:
     small = type(value) is int and abs(value) < 2**64
     return str(value) if small else f"a {type(value).__name__} that is too large or no number"
-
-
-def _shown(text: str) -> str:
-    return repr(text if len(text) <= 80 else f"{text[:77]}...")

@@ -13,7 +13,7 @@ from jaxphys.weights.places import best_place, file_sets, stand_in
 from jaxphys.weights.safetensors_files import open_arrays
 from jaxphys.weights.torch_zip import read_torch_zip
 
-INDEX = ".safetensors.index.json"
+INDEX = ".safetensors.index."
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,7 @@ def _sha256(path: Path) -> str:
 
 def _open(path: Path) -> None:
     """Reads what tells whether a file is whole. Raises InputError if it is not."""
-    if path.name.endswith(INDEX):
-        open_arrays(path.parent, path.name.removesuffix(INDEX))
-    elif path.suffix == ".safetensors":
+    if path.suffix == ".safetensors" or INDEX in path.name:
         open_arrays(path)
     elif path.suffix in (".pt", ".pth"):
         read_torch_zip(path)

@@ -16,3 +16,12 @@ def test_a_wrong_answer_fails_with_advice():
 
 def test_not_a_number_is_a_wrong_answer():
     assert not report({"nan": lambda: (float("nan"), 1e-5)})[1]
+
+
+def test_a_check_that_raises_has_failed_and_the_others_are_made():
+    def broken():
+        raise RuntimeError("no\nbackend")
+
+    text, healthy = report({"bad": broken, "good": lambda: (1e-8, 1e-5)})
+    assert not healthy and "pip install" in text
+    assert "FAIL bad: raised RuntimeError: no backend\nok   good" in text

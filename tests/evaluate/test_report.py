@@ -78,7 +78,7 @@ def test_few_frames_are_spread_evenly(finished, clip_folder):
     assert few["frames"] == {"total": FRAMES, "scored": 3}
     np.testing.assert_allclose(few["clip"]["by_frame"], everything[::2], atol=1e-6)
     assert evenly_spaced(4, None) == evenly_spaced(4, 9) == [0, 1, 2, 3]
-    with pytest.raises(InputError, match="--frames 0: must be at least 1"):
+    with pytest.raises(InputError, match="--frames: 0 must be at least 1"):
         evaluate(finished, clip=clip_folder, frames=0)
 
 

@@ -1,4 +1,7 @@
 import dataclasses
+import json
+import struct
+import tracemalloc
 
 import jax
 import jax.numpy as jnp
@@ -241,3 +244,75 @@ def test_unusable_files_are_refused(tmp_path):
         load_mesh(tmp_path / "line.off", up="x")
     with pytest.raises(InputError, match="at least 1"):
         sample_surface(plain(SHAPES["sphere"]), 0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "match"),
+    [
+        ("mtllib parts.mtl", "mtllib", "box.obj: a line mtllib names no file"),
+        ("v 1 1 0", "v 1 1", "box.obj: "),
+        ("v 1 1 0", "v 1e155 1e155 0", "beyond 1e"),
+        ("v 1 1 0", "v nan 1 0", "not finite"),
+    ],
+)
+def test_lines_that_say_nothing_usable(tmp_path, old, new, match):
+    write_obj(tmp_path)
+    (tmp_path / "box.obj").write_text(OBJ.replace(old, new))
+    with pytest.raises(InputError, match=match):
+        load_mesh(tmp_path / "box.obj")
+
+
+def test_a_texture_without_a_name(tmp_path):
+    write_obj(tmp_path)
+    path = tmp_path / "parts.mtl"
+    path.write_text(path.read_text().replace("map_Kd picture.png", "map_Kd "))
+    with pytest.raises(InputError, match=r"parts.mtl: a line map_Kd names no file"):
+        load_mesh(tmp_path / "box.obj")
+
+
+def test_corners_all_of_two_numbers(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n")
+    with pytest.raises(InputError, match=r"a.obj: "):
+        load_mesh(tmp_path / "a.obj")
+
+
+@pytest.mark.filterwarnings("ignore:Image size")
+def test_small_pictures_that_unpack_to_gigabytes_are_refused_unread(tmp_path):
+    write_obj(tmp_path)
+    Image.new("1", (13_000, 13_000)).save(tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").stat().st_size < 100_000
+    tracemalloc.start()
+    with pytest.raises(InputError, match="its textures have 169 million pixels"):
+        load_mesh(tmp_path / "box.obj")
+    box = trimesh.creation.box()
+    with Image.open(tmp_path / "picture.png") as image:
+        box.visual = TextureVisuals(
+            uv=np.full((8, 2), 0.5), material=PBRMaterial(baseColorTexture=image)
+        )
+        (tmp_path / "a.glb").write_bytes(trimesh.Scene(box).export(file_type="glb"))
+    tracemalloc.reset_peak()
+    with pytest.raises(InputError, match=r"a.glb: its textures have 169 million pixels"):
+        load_mesh(tmp_path / "a.glb")
+    assert tracemalloc.get_traced_memory()[1] < 50e6
+    tracemalloc.stop()
+
+
+def test_meshes_too_small_for_numbers(tmp_path):
+    trimesh.creation.box().apply_scale(1e-20).export(tmp_path / "a.stl", file_type="stl_ascii")
+    with pytest.raises(InputError, match=r"a.stl: "):
+        load_mesh(tmp_path / "a.stl")
+
+
+def test_corners_that_are_promised_and_not_there(tmp_path):
+    path = tmp_path / "a.glb"
+    data = trimesh.Scene(trimesh.creation.box()).export(file_type="glb")
+    (length,) = struct.unpack_from("<I", data, 12)
+    tree = json.loads(data[20 : 20 + length])
+    for accessor in tree["accessors"]:
+        del accessor["bufferView"]
+        accessor["count"] = 2**31
+    text = json.dumps(tree).encode()
+    rest = struct.pack("<I4s", len(text), b"JSON") + text + data[20 + length :]
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(rest)) + rest)
+    with pytest.raises(InputError, match=r"a.glb: promises .* corners"):
+        load_mesh(path)

@@ -127,9 +127,13 @@ def test_damaged_files_are_refused(tmp_path):
     refuse(tmp_path, data.replace(b"float x\n", b"list uchar float x\n"), "list properties")
     refuse(tmp_path, data.replace(b"float y\n", b"float x\n"), "'x' stands twice")
     refuse(tmp_path, data, "limit of 2", limit=2)
-    with pytest.raises(InputError, match=r"missing.ply: cannot be read"):
+    refuse(tmp_path, b"ply\nformat ascii 1.0\nelement vertex 3\nend_header\n", "no fields")
+    escapes = data.replace(b"float y\n", b"flo\x1b[31m y\n")
+    refuse(tmp_path, escapes, r"header line 'property flo\\x1b\[31m y' is not known")
+    refuse(tmp_path, data[:-4] + struct.pack("<f", 1e30), "'rot_3' is not finite, or beyond 1e")
+    with pytest.raises(InputError, match=r"missing.ply: no such file"):
         read_ply(tmp_path / "missing.ply")
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="is a folder"):
         read_ply(tmp_path)
 
 

@@ -178,10 +178,10 @@ def test_what_a_file_leaves_out_has_the_published_default():
         ({"block_out_channels": 320}, "block_out_channels: expected a list"),
         ({"attention_head_dim": [8, 8]}, "attention_head_dim: 2 blocks"),
         ({"attention_head_dim": 7}, "attention_head_dim: 7 heads do not divide 320"),
-        ({"layers_per_block": [2, 2, 2, 2]}, "layers_per_block: expected a positive integer"),
-        ({"cross_attention_dim": True}, "cross_attention_dim: expected a positive integer"),
+        ({"layers_per_block": [2, 2, 2, 2]}, "layers_per_block: expected a whole number"),
+        ({"cross_attention_dim": True}, "cross_attention_dim: expected a whole number"),
         ({"norm_eps": "small"}, "norm_eps: expected a number"),
-        ({"attention_slice": 0}, "attention_slice: expected a positive integer or null"),
+        ({"attention_slice": 0}, "attention_slice: 0 must be at least 1"),
         ({"_class_name": "AutoencoderKL"}, "_class_name: expected 'UNet2DConditionModel'"),
     ],
 )

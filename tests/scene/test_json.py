@@ -1,5 +1,6 @@
 import dataclasses
 import json
+import typing
 
 import pytest
 
@@ -121,3 +122,50 @@ def test_missing_and_enormous_files(tmp_path):
 def test_written_file_is_plain_json(tmp_path):
     write_scene(tmp_path / "a.json", FULL)
     assert json.loads((tmp_path / "a.json").read_text())["objects"][0]["material"] == "metal"
+
+
+def numbers_of(kind):
+    """The plain types that a field's type is made of, without those of dataclasses."""
+    parts = typing.get_args(kind)
+    if typing.get_origin(kind) is typing.Literal:
+        return []
+    return [leaf for part in parts for leaf in numbers_of(part)] if parts else [kind]
+
+
+def declared(cls, seen):
+    """(class, field, its plain types) of all that a scene is made of."""
+    for entry in dataclasses.fields(cls):
+        leaves = numbers_of(typing.get_type_hints(cls)[entry.name])
+        yield cls, entry, leaves
+        for leaf in leaves:
+            if dataclasses.is_dataclass(leaf) and leaf not in seen:
+                seen.add(leaf)
+                yield from declared(leaf, seen)
+
+
+def test_every_number_of_a_scene_has_a_range():
+    for cls, entry, leaves in declared(Scene, set()):
+        # What parameters may be is for the material to say.
+        if {int, float} & set(leaves) and entry.name != "parameters":
+            rules = entry.metadata
+            assert rules["most"] <= 1e15, (cls, entry.name)
+            assert max(rules.get("least", -1e99), rules.get("above", -1e99)) >= -1e15
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        {"frame_time": 5e-324},
+        {"frame_time": 1e300},
+        {"domain": {"size": [1e300, 1, 1], "spacing": 5e-324}},
+        {"domain": {"size": [1e6, 1e6, 1e6], "spacing": 1e-9}},
+        {"seed": 10**400},
+        {"frames": 10**5000},
+        {"objects": [{"splats": 10**30}]},
+        {"objects": [{"centre": [1e155, 0, 0]}]},
+        {"objects": [{"filling": {"per_cell": 10**9}}]},
+    ],
+)
+def test_numbers_are_held_against_their_range_before_any_arithmetic(value):
+    with pytest.raises(InputError):
+        scene_from_json(value)

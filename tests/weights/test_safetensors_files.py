@@ -209,3 +209,30 @@ def test_a_changed_byte_is_an_error_or_other_arrays_but_never_anything_else(tmp_
         assert all(isinstance(arrays[name], np.ndarray) for name in arrays)
     except InputError as error:
         assert str(path) in str(error)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16, ml_dtypes.bfloat16, np.float64])
+def test_numbers_that_are_not_finite_are_refused_by_name(tmp_path, dtype):
+    spoiled = np.ones((3, 4), dtype)
+    spoiled[2, 1] = np.nan
+    save_file({"good": np.ones(2, dtype), "layer.bad": spoiled}, tmp_path / "a.safetensors")
+    arrays = open_arrays(tmp_path / "a.safetensors")
+    assert arrays["good"].sum() == 2
+    with pytest.raises(InputError, match=r"a\.safetensors: array 'layer\.bad' .*not finite"):
+        arrays["layer.bad"]
+
+
+def test_shards_at_half_precision_as_diffusers_names_them(tmp_path):
+    stem = "diffusion_pytorch_model"
+    listed = {}
+    for i, (name, array) in enumerate(SMALL.items(), 1):
+        file = f"{stem}.fp16-0000{i}-of-00002.safetensors"
+        save_file({name: array}, tmp_path / file)
+        listed[name] = file
+    index = tmp_path / f"{stem}.safetensors.index.fp16.json"
+    index.write_text(json.dumps({"metadata": {}, "weight_map": listed}))
+    assert_small(open_arrays(tmp_path, stem))
+    assert_small(open_arrays(index))
+    # Full precision counts before half, whole files before shards.
+    save_file({"full": SMALL["a"]}, tmp_path / f"{stem}.safetensors")
+    assert set(open_arrays(tmp_path, stem)) == {"full"}

@@ -381,9 +381,9 @@ def test_too_long_a_pickle(tmp_path):
 
 
 def test_missing_file_and_folder(tmp_path):
-    with pytest.raises(InputError, match=r"none\.pt.*No such file"):
+    with pytest.raises(InputError, match=r"none\.pt.*no such file"):
         read_torch_zip(tmp_path / "none.pt")
-    with pytest.raises(InputError, match="directory"):
+    with pytest.raises(InputError, match="folder"):
         read_torch_zip(tmp_path)
 
 

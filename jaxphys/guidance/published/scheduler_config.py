@@ -6,14 +6,15 @@ the file's. Options that would need another computation are refused, by their na
 methods that are not used here do nothing.
 """
 
-import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
 import numpy as np
 
-from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.dataclass_reader import from_json
+from jaxphys.core.errors import InputError, nearest, shown
+from jaxphys.core.fields import check_ranges
 from jaxphys.guidance.diffusion.discrete_schedule import Betas, DiscreteSchedule
 from jaxphys.guidance.diffusion.schedule import Kind
 
@@ -85,13 +86,15 @@ class SchedulerConfig:
     steps_offset: int = 0
     set_alpha_to_one: bool = True
     clip_sample: bool = True
-    clip_sample_range: float = 1.0
+    clip_sample_range: float = field(default=1.0, metadata={"above": 0})
 
     def __post_init__(self):
         for name, valid in CHOICES.items():
             value = getattr(self, name)
             if value not in valid:
-                raise InputError(f"{name}: {value!r} is not supported; {nearest(value, valid)}")
+                raise InputError(
+                    f"{name}: {shown(value)} is not supported; {nearest(value, valid)}"
+                )
         if not 2 <= self.num_train_timesteps <= MOST_STEPS:
             raise InputError(
                 f"num_train_timesteps: {self.num_train_timesteps} must be 2 to {MOST_STEPS}"
@@ -100,8 +103,7 @@ class SchedulerConfig:
             raise InputError(
                 f"steps_offset: {self.steps_offset} must be 0 to {self.num_train_timesteps - 1}"
             )
-        if not self.clip_sample_range > 0:
-            raise InputError(f"clip_sample_range: {self.clip_sample_range} must be above 0")
+        check_ranges(self)
         self.schedule()  # has ranges of its own
 
     @classmethod
@@ -115,22 +117,17 @@ class SchedulerConfig:
         name = values.get("_class_name", "DDIMScheduler")
         if not isinstance(name, str) or name not in CLASSES:
             tail = nearest(str(name), CLASSES)
-            raise InputError(f"{source}: _class_name: {name!r} is not supported; {tail}")
-        fields = {field.name: field.type for field in dataclasses.fields(cls)}
-        given = dict(CLASSES[name])
-        for option, value in values.items():
-            where = f"{source}: {option}"
-            if option in fields:
-                given[option] = _checked(fields[option], value, where)
-            elif option.startswith("_") or option in IDLE:
-                continue
-            elif value not in (valid := (None, False, *PLAIN.get(option, ()))):
+            raise InputError(f"{source}: _class_name: {shown(name)} is not supported; {tail}")
+
+        def unknown(option: str, value: Any) -> None:
+            valid = (None, False, *PLAIN.get(option, ()))
+            if not option.startswith("_") and option not in IDLE and value not in valid:
                 allowed = " or ".join(map(repr, valid))
-                raise InputError(f"{where}: {repr(value)[:60]} is not supported, only {allowed}")
-        try:
-            return cls(**given)
-        except InputError as error:
-            raise InputError(f"{source}: {error}") from None
+                raise InputError(
+                    f"{source}: {option}: {shown(value)} is not supported, only {allowed}"
+                )
+
+        return from_json(cls, dict(CLASSES[name]) | dict(values), f"{source}: ", unknown)
 
     def schedule(self) -> DiscreteSchedule:
         """The noise of each step of the training."""
@@ -168,12 +165,3 @@ class SchedulerConfig:
         reached = asked - stride
         end = CLEAN if self.set_alpha_to_one else 0
         return asked, np.where(reached < 0, end, reached)
-
-
-def _checked(kind: type, value: Any, where: str) -> Any:
-    good = isinstance(value, (int, float) if kind is float else kind)
-    good &= kind is bool or not isinstance(value, bool)
-    if not good or (kind is float and not np.isfinite(value)):
-        names = {int: "a whole number", float: "a number", bool: "true or false", str: "a name"}
-        raise InputError(f"{where}: expected {names[kind]}, found {value!r}")
-    return value

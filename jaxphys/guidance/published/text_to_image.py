@@ -1,6 +1,6 @@
 """Pictures from text by Stable Diffusion: what it paints shows whether a checkpoint is whole."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import jax
@@ -10,6 +10,7 @@ from flax import nnx
 from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.fields import Checked, between
 from jaxphys.guidance.diffusion.discrete_schedule import DiscreteSchedule
 from jaxphys.guidance.diffusion.samplers import sample_ddim
 from jaxphys.guidance.diffusion.schedule import Estimate, guided, interpret
@@ -25,7 +26,7 @@ from jaxphys.networks.autoencoder import Decoder
 
 
 @dataclass(frozen=True)
-class PaintConfig:
+class PaintConfig(Checked):
     """How a picture is sampled.
 
     Attributes:
@@ -38,19 +39,18 @@ class PaintConfig:
         dtype: of weights and computation.
     """
 
-    steps: int = 50
-    guidance: float = 7.5
+    steps: int = field(default=50, metadata=between(1, 100_000))
+    guidance: float = field(default=7.5, metadata=between(-1e3, 1e3))
     sampler: Sampler = "ddim"
-    width: int | None = None
-    height: int | None = None
-    attention_slice: int | None = 1024
+    width: int | None = field(default=None, metadata=between(1, 8192))
+    height: int | None = field(default=None, metadata=between(1, 8192))
+    attention_slice: int | None = field(default=1024, metadata=between(1, 1_000_000))
     dtype: str = "bfloat16"
 
     def __post_init__(self):
+        super().__post_init__()
         if self.sampler not in SAMPLERS:
             raise InputError(f"sampler {self.sampler!r}: {nearest(self.sampler, SAMPLERS)}")
-        if self.steps < 1:
-            raise InputError(f"steps = {self.steps}: needs at least one")
 
 
 def clipped(
