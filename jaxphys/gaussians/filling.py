@@ -22,8 +22,8 @@ from scipy.spatial import cKDTree
 from jaxphys.core.errors import InputError
 from jaxphys.core.rotations import quaternion_to_matrix
 from jaxphys.gaussians.gaussians import Gaussians, opacities, require_finite, scales
-from jaxphys.gaussians.hull import enclosed
-from jaxphys.gaussians.volumes import body_volumes, cell_volumes, thinned
+from jaxphys.gaussians.hull import GAP, enclosed, surface_spacing
+from jaxphys.gaussians.volumes import DEEP, SAMPLES, body_volumes, cell_volumes, thinned
 
 _MARGIN = 2
 _JITTER = 0.25
@@ -172,12 +172,17 @@ def inner_cells(density: np.ndarray, config: FillingConfig) -> np.ndarray:
     return inside
 
 
-def _lattice(origin: np.ndarray, shape: tuple[int, int, int], config: FillingConfig) -> np.ndarray:
-    """Middles (L, 3) [m] of cubes as wide as the filling's pitch, all over the grid."""
+def _lattice(
+    origin: np.ndarray, shape: tuple[int, int, int], config: FillingConfig
+) -> tuple[np.ndarray, np.ndarray]:
+    """Corner (3,) [m] and shape (3,) of a lattice of the filling's pitch all over the grid."""
     extent = np.array(shape) * config.spacing
     count = np.floor(extent / config.pitch + 1e-6).astype(int)
-    index = np.stack(np.meshgrid(*map(np.arange, count), indexing="ij"), axis=-1).reshape(-1, 3)
-    return origin + config.pitch * (index + 0.5) + 0.5 * (extent - count * config.pitch)
+    return origin + 0.5 * (extent - count * config.pitch), count
+
+
+def _middles(corner: np.ndarray, pitch: float, index: np.ndarray) -> np.ndarray:
+    return corner + pitch * (index + 0.5)
 
 
 class Filled(NamedTuple):
@@ -232,7 +237,9 @@ def fill(
         own = density[tuple(present.T)]
         config = replace(config, density_threshold=0.25 * float(np.median(own)))
     inner = inner_cells(density, config)
-    middles = _lattice(origin, shape, config)
+    corner, count = _lattice(origin, shape, config)
+    index = np.stack(np.meshgrid(*map(np.arange, count), indexing="ij"), axis=-1).reshape(-1, 3)
+    middles = _middles(corner, config.pitch, index)
     # Moved by up to a quarter of a pitch along each axis: at least half a pitch apart, which places
     # drawn at random are not, and in no rows.
     jitter = np.random.default_rng(seed).uniform(-_JITTER, _JITTER, middles.shape)
@@ -246,10 +253,15 @@ def fill(
     without = places[~solid[cell] & ~within]
     first, _ = thinned(means, config.pitch / 4)
     body = enclosed(means[first], places[within], without)
+    fine = config.pitch / SAMPLES
+    samples = body.samples(corner, fine, SAMPLES * count)
     unsure = np.flatnonzero(solid[cell] & ~within)
-    within[unsure] = body.contains(places[unsure])
+    within[unsure] = samples[tuple(_cells(places[unsure], corner, fine).T)]
     points = places[within]
-    points = points[cKDTree(means).query(points)[0] > config.pitch / 2]
+    # Half a pitch from the skin, which is nearer than its points where it is sparse.
+    distance, nearest = cKDTree(means).query(points)
+    gap = np.minimum(GAP * surface_spacing(means)[nearest], config.pitch / 2)
+    points = points[np.hypot(gap, config.pitch / 2) < distance]
     if config.area is not None:
         area = np.asarray(config.area)
         points = points[np.all((points > area[0::2]) & (points < area[1::2]), axis=1)]
@@ -257,7 +269,12 @@ def fill(
         raise _too_many(len(points), config)
     if spread is not None and len(points):
         points = spread(points)
-    return Filled(points, body_volumes(means, points, config.pitch, body, middles))
+    cut = cKDTree(means).query(middles)[0] < DEEP * config.pitch
+    fine_cells = np.stack(np.meshgrid(*[np.arange(SAMPLES)] * 3, indexing="ij"), axis=-1)
+    fine_index = (SAMPLES * index[cut][:, None] + fine_cells.reshape(-1, 3)).reshape(-1, 3)
+    fine_index = fine_index[samples[tuple(fine_index.T)]]
+    near = _middles(corner, fine, fine_index)
+    return Filled(points, body_volumes(means, points, config.pitch, body.volume, near))
 
 
 def _too_many(count: int, config: FillingConfig) -> InputError:

@@ -17,31 +17,54 @@ from scipy.spatial import Delaunay, cKDTree
 _FACES = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # face k lies opposite corner k
 # In spacings of the skin: moves points off common spheres and planes, which stall the search.
 _JIGGLE = 1e-4
-_GAP = 2.0
+_REACH = 2.0  # of the ball, in spacings of the skin
+# From a point of the skin to the middle of a triangle of its points, in spacings.
+GAP = 0.6
+_BOX = 4.0  # in sizes of the skin
+_HAIR = np.array([1.7e-5, 2.9e-5, 0.0])
 
 
 class Body(NamedTuple):
-    """Tetrahedra of a body and of what is around it.
+    """A body by its surface.
 
     Attributes:
-        mesh: of all points.
-        inside: (T,), whether each tetrahedron belongs to the body.
-        volume: of each [m^3], (T,).
+        triangles: of the closed surface (B, 3, 3) [m].
+        volume: within it [m^3].
     """
 
-    mesh: Delaunay
-    inside: np.ndarray
-    volume: np.ndarray
+    triangles: np.ndarray
+    volume: float
 
-    def contains(self, points: np.ndarray) -> np.ndarray:
-        """Whether each of `points` (N, 3) [m] is in the body."""
-        found = self.mesh.find_simplex(points)
-        return (found >= 0) & self.inside[found]
+    def samples(self, origin: np.ndarray, pitch: float, shape: np.ndarray) -> np.ndarray:
+        """Whether the middle of each cube of a lattice is inside, a mask in its `shape` (3,).
 
-    @property
-    def total(self) -> float:
-        """Volume of the body [m^3]."""
-        return float(self.volume[self.inside].sum())
+        By the parity of the triangles below it. The columns are moved by a hair, so that none
+        meets an edge of a lattice's own.
+        """
+        nx, ny, nz = (int(n) for n in shape)
+        a, b, c = np.moveaxis((self.triangles - origin) / pitch - 0.5 + _HAIR, 1, 0)
+        flat = np.stack([a, b, c])[..., :2]
+        low = np.maximum(np.ceil(flat.min(axis=0)), 0).astype(np.int64)
+        high = np.minimum(np.floor(flat.max(axis=0)), [nx - 1, ny - 1]).astype(np.int64)
+        wide, deep = np.maximum(high - low + 1, 0).T
+        face = np.repeat(np.arange(len(a)), wide * deep)
+        rank = np.arange(len(face)) - np.repeat(np.cumsum(wide * deep) - wide * deep, wide * deep)
+        i, j = low[face, 0] + rank // deep[face], low[face, 1] + rank % deep[face]
+        column = np.stack([i, j], axis=-1)
+
+        def doubled(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+            """Twice the signed area of a column and an edge of its triangle, seen from above."""
+            along, offset = (q - p)[face, :2], column - p[face, :2]
+            return along[:, 0] * offset[:, 1] - along[:, 1] * offset[:, 0]
+
+        weights = np.stack([doubled(b, c), doubled(c, a), doubled(a, b)])
+        met = np.all(weights > 0, axis=0) | np.all(weights < 0, axis=0)
+        heights = np.stack([a[face, 2], b[face, 2], c[face, 2]])[:, met]
+        height = np.sum(weights[:, met] * heights, axis=0) / weights[:, met].sum(axis=0)
+        above = np.clip(np.ceil(height), 0, nz).astype(np.int64)
+        crossed = np.zeros((nx, ny, nz + 1), np.uint8)
+        np.add.at(crossed, (i[met], j[met], above), 1)
+        return np.bitwise_xor.accumulate(crossed % 2, axis=2)[:, :, :nz].astype(bool)
 
 
 def surface_spacing(skin: np.ndarray) -> np.ndarray:
@@ -79,15 +102,17 @@ def enclosed(skin: np.ndarray, within: np.ndarray, without: np.ndarray) -> Body:
     Places within `reach` of the skin are not taken as known, for they would come through its gaps.
     """
     spacing = surface_spacing(skin)
-    reach = _GAP * np.quantile(spacing, 0.9)
+    reach = _REACH * np.quantile(spacing, 0.9)
     within, without = (_known(skin, reach, places) for places in (within, without))
+    # Corners of a box around everything: whatever is asked for lies in some tetrahedron.
+    middle, size = (skin.max(0) + skin.min(0)) / 2, np.ptp(skin, axis=0).max()
+    box = middle + _BOX * size * np.array(list(np.ndindex(2, 2, 2))) - _BOX * size / 2
+    without = np.concatenate([without, box])
     points = np.concatenate([skin, within, without])
     noise = np.random.default_rng(0).uniform(-1, 1, points.shape)
     points = points + _JIGGLE * np.median(spacing) * noise
     mesh = Delaunay(points)
     corners, across = mesh.simplices, mesh.neighbors
-    a, b, c, d = (points[corners[:, k]] for k in range(4))
-    volume = np.abs(np.einsum("ti,ti->t", b - a, np.cross(c - a, d - a))) / 6
     kind = np.repeat([0, 1, 2], [len(skin), len(within), len(without)])[corners]
     outside = (kind == 2).any(axis=1)
     # A tetrahedron with points of both sides spans a gap of the skin: the inside closes it.
@@ -104,4 +129,12 @@ def enclosed(skin: np.ndarray, within: np.ndarray, without: np.ndarray) -> Body:
     _, part = connected_components(coo_matrix((np.ones(len(start)), (start, end)), (size, size)))
     reached = np.zeros(part.max() + 1, bool)
     reached[part[outside]] = True
-    return Body(mesh, ~(reached[part] | outside), volume)
+    inside = ~(reached[part] | outside)
+    a, b, c, d = (points[corners[inside, k]] for k in range(4))
+    volume = np.abs(np.einsum("ti,ti->t", b - a, np.cross(c - a, d - a))).sum() / 6
+    surface = []
+    for k in range(4):
+        # Every face of the hull belongs to a corner of the box: no neighbour, no body.
+        skin_face = inside & ~inside[across[:, k]]
+        surface.append(points[corners[skin_face][:, _FACES[k]]])
+    return Body(np.concatenate(surface), float(volume))

