@@ -13,9 +13,9 @@ from scipy.spatial import cKDTree
 from jaxphys.gaussians.hull import surface_spacing
 
 # Points of the skin closer together than this many pitches of the filling count as one place, and
-# places within 1.2 pitches, or two spacings, share what is nearest to them evenly.
+# places within 1.5 pitches, or two spacings, share what is nearest to them evenly.
 _MERGED = 0.25
-_EVEN = 1.2
+_EVEN = 1.5
 _EVEN_SPACINGS = 2.0
 # Farther than this from the skin, in pitches, no cube of a particle is cut by it.
 DEEP = 2.0
@@ -70,7 +70,7 @@ def body_volumes(
             not needed.
 
     Deep inside each particle has its cube. Near the skin it has what is nearest to it, within a
-    factor of 1.5 of its cube; the rest is the skin's, which shares it evenly over about a pitch, so
+    factor of 1.5 of its cube; the rest is the skin's, which shares it evenly over 1.5 pitches, so
     that a share does not depend on which splat happens to lie deepest.
     """
     near = cKDTree(skin).query(inner)[0] < DEEP * pitch

@@ -141,8 +141,8 @@ def backdrop(
     paper, floor = jnp.array(background, dtype), jnp.array(colour, dtype)
     plain = paper + fade * (floor - paper)
     picture = plain * (1 - shadow * jnp.where(seen, dark, 0)[..., None])
-    # Paper stays as it is: noise begins where the floor differs from it by half a level.
+    # Rounded to levels, the mean is what it should be. Bare paper stays as it is.
     level = 1 / 255
     noise = level * _noise(camera.width, camera.height, dtype)[..., None]
-    differs = jnp.max(jnp.abs(picture - paper), axis=-1, keepdims=True) > level / 2
+    differs = jnp.max(jnp.abs(picture - paper), axis=-1, keepdims=True) > 1e-3 * level
     return picture + jnp.where(differs, noise, 0)
