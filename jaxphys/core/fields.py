@@ -90,14 +90,21 @@ def _bound(value: float) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def check_value(name: str, value: Any, rules: Mapping[str, Any]) -> None:
+    """Raises `InputError` where a value, plain or a tuple of plain ones, breaks the rules of its
+    field's metadata, or a number is not finite.
+    """
+    _check_form(name, value, rules)
+    for number in _numbers(value):
+        check_number(name, number, rules)
+
+
 def check_ranges(instance: Any) -> None:
     """Raises `InputError` where a value of a dataclass breaks what its field's metadata says, or a
     number is not finite.
     """
     for entry in dataclasses.fields(instance):
-        _check_form(entry.name, getattr(instance, entry.name), entry.metadata)
-        for number in _numbers(getattr(instance, entry.name)):
-            check_number(entry.name, number, entry.metadata)
+        check_value(entry.name, getattr(instance, entry.name), entry.metadata)
 
 
 class Checked:

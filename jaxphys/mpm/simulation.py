@@ -1,5 +1,6 @@
 """A simulation ready to run: program, numbers and start, and the same one with other numbers."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -83,7 +84,14 @@ class Simulation:
         )
 
     def with_(
-        self, *, velocity=None, gravity=None, density=None, friction=None, **parameters
+        self,
+        *,
+        velocity=None,
+        gravity=None,
+        density=None,
+        friction=None,
+        boundaries: Mapping[int, Mapping[str, Any]] | None = None,
+        **parameters,
     ) -> "Simulation":
         """The same simulation with other numbers, which may be traced and differentiated.
 
@@ -96,6 +104,8 @@ class Simulation:
             gravity: (3,) [m/s^2].
             density: [kg/m^3], a number or (N,).
             friction: Coulomb's coefficient of every boundary that has one.
+            boundaries: other numbers of single boundaries, by their place in the scene's list, such
+                as `{0: {"point": (0.0, 0.0, 0.2)}}`.
             parameters: of the materials, such as `youngs_modulus`: a number or (N,).
 
         Arrays (N,) and (N, 3) are in the object's order: each object's Gaussians as they were
@@ -116,7 +126,7 @@ class Simulation:
                     "scene with a positive one to change it"
                 )
             if name not in known:
-                names = {*known, "velocity", "gravity", "density", "friction"}
+                names = {*known, "velocity", "gravity", "density", "friction", "boundaries"}
                 raise InputError(f"with_: no material here has {name!r}; {nearest(name, names)}")
             model = replace(
                 model, parameters=model.parameters | {name: self._per_particle(name, value)}
@@ -125,6 +135,8 @@ class Simulation:
             model = replace(model, gravity=_vector("gravity", gravity, model.mass.dtype))
         if friction is not None:
             model = replace(model, boundaries=_with_friction(model.boundaries, friction))
+        if boundaries is not None:
+            model = replace(model, boundaries=_with_numbers(model.boundaries, boundaries))
         if velocity is not None:
             state = state._replace(
                 velocity=self._velocities(velocity), affine=jnp.zeros_like(state.affine)
@@ -186,15 +198,20 @@ def _vector(name: str, value: Any, dtype) -> Array:
     return value
 
 
+def _with_numbers(boundaries: tuple, changes: Mapping[int, Mapping[str, Any]]) -> tuple:
+    made = list(boundaries)
+    for index, values in changes.items():
+        if index not in range(len(made)):
+            raise InputError(f"with_: boundaries[{index}]: there are {len(made)}, counted from 0")
+        try:
+            made[index] = made[index].changed(**values)
+        except InputError as error:
+            raise InputError(f"with_: boundaries[{index}].{error}") from None
+    return tuple(made)
+
+
 def _with_friction(boundaries: tuple, friction: Any) -> tuple:
-    if not _is_traced(friction) and not np.all(np.asarray(friction) >= 0):
-        raise InputError(f"with_: friction is {friction}, must be >= 0")
     rough = [i for i, b in enumerate(boundaries) if getattr(b, "friction", None) is not None]
     if not rough:
-        raise InputError("with_: no boundary here has friction; give one friction above 0")
-    return tuple(
-        replace(b, friction=jnp.broadcast_to(friction, jnp.shape(b.friction)).astype(b.friction))
-        if i in rough
-        else b
-        for i, b in enumerate(boundaries)
-    )
+        raise InputError("with_: no boundary here has friction; build one with friction above 0")
+    return _with_numbers(boundaries, {i: {"friction": friction} for i in rough})

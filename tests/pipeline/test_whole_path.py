@@ -19,7 +19,7 @@ from jaxphys.pipeline.draw import deformed_gaussians, draw
 from jaxphys.pipeline.frames import simulate
 from jaxphys.render.camera import orbit
 from jaxphys.render.settings import Settings
-from jaxphys.scene import Domain, Filling, Object, Scene
+from jaxphys.scene import Box, Domain, Filling, Object, Plane, Scene
 from jaxphys.scene.build import build
 from tests.render.reference import render_dense
 
@@ -191,3 +191,59 @@ def test_a_look_refuses_the_motion_of_something_else(hollow):
     fewer = replace(simulation, carriers=simulation.carriers[:20])
     with pytest.raises(InputError, match="50 Gaussians on positions"):
         draw(look, fewer.frame(simulation.state), CAMERA)
+
+
+@pytest.fixture(scope="module")
+def landing():
+    """A ball that a floor and a box touch from the start."""
+    floor = Plane((0.5, 0.5, 0.3), friction=0.3)
+    push = Box((0.5, 0.5, 0.9), (0.3, 0.3, 0.2), velocity=(0.0, 0.0, -0.5), surface="separate")
+    asked = scene(None, boundaries=(floor, push), damping=0.1)
+    return build(asked, gaussians(), dtype="float64").simulation
+
+
+def test_numbers_of_boundaries_reach_the_motion_and_its_gradient(landing):
+    numbers = {
+        0: {
+            "point": (0.5, 0.5, 0.31),
+            "normal": (0.1, 0.0, 1.0),
+            "velocity": (0.0, 0.0, 0.3),
+            "friction": 0.6,
+        },
+        1: {"centre": (0.5, 0.5, 0.89), "velocity": (0.1, 0.0, -0.6)},
+    }
+    numbers = {i: {k: jnp.asarray(v) for k, v in of.items()} for i, of in numbers.items()}
+
+    def loss(numbers):
+        motion = rollout_frames(landing.with_(boundaries=numbers), 3)
+        return jnp.sum(motion.position[-1] ** 2)
+
+    gradient = jax.jit(jax.grad(loss))(numbers)
+    loss, step = jax.jit(loss), 1e-5
+    for index, of in numbers.items():
+        for name, value in of.items():
+            direction = jnp.ones_like(value)
+
+            def at(t, index=index, name=name, value=value, direction=direction):
+                return loss(numbers | {index: numbers[index] | {name: value + t * direction}})
+
+            difference = float(at(step) - at(-step)) / (2 * step)
+            assert difference != 0
+            assert float(jnp.sum(gradient[index][name])) == pytest.approx(difference, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"boundaries": {7: {"point": (0.0, 0.0, 0.0)}}}, r"boundaries\[7\]: there are 3"),
+        ({"boundaries": {0: {"pont": (0.0, 0.0, 0.0)}}}, r"boundaries\[0\]\.pont.*'point'"),
+        ({"boundaries": {0: {"surface": "slip"}}}, "surface: is no number"),
+        ({"boundaries": {0: {"point": (0.0, 1.0)}}}, "expected 3 values"),
+        ({"boundaries": {1: {"friction": 0.5}}}, "leaves it out of the program"),
+        ({"friction": -1.0}, "at least 0"),
+        ({"friction": np.nan}, "not a finite number"),
+    ],
+)
+def test_with_refuses_what_boundaries_cannot_be(landing, changes, message):
+    with pytest.raises(InputError, match=message):
+        landing.with_(**changes)

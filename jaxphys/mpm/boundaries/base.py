@@ -9,12 +9,22 @@ stages of a step; a stage that it does not act in is not traced.
 from dataclasses import dataclass, field, fields, replace
 from typing import ClassVar, Self
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
-from jaxphys.core.fields import NON_NEGATIVE, POSITIVE, Checked, between, direction, unit, vector
+from jaxphys.core.fields import (
+    NON_NEGATIVE,
+    POSITIVE,
+    Checked,
+    between,
+    check_value,
+    direction,
+    unit,
+    vector,
+)
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.state import Model
 
@@ -83,6 +93,37 @@ class Boundary(Checked):
                 changes[entry.name] = jnp.asarray(value, setting.dtype)
                 self._check_shape(entry, changes[entry.name])
         return replace(self, **changes)
+
+    def changed(self, **values) -> Self:
+        """A prepared boundary with other numbers, which may be traced and differentiated.
+
+        Raises:
+            InputError: a field that does not exist, chooses code, or is left out of the program; a
+                wrong shape; a known number out of range.
+        """
+        numbers = {
+            entry.name: entry
+            for entry in fields(self)
+            if not entry.metadata.get("static") and entry.metadata.get("keys") != ()
+        }
+        arrays = {}
+        for name, value in values.items():
+            if name not in numbers:
+                raise InputError(f"{name}: is no number of a {self.type}; {nearest(name, numbers)}")
+            now = getattr(self, name)
+            if now is None:
+                raise InputError(
+                    f"{name}: was built as zero or none, which leaves it out of the program; build "
+                    "the scene with another one to change it"
+                )
+            if not isinstance(value, jax.core.Tracer):
+                plain = np.asarray(value, np.float64)
+                plain = tuple(plain.tolist()) if plain.ndim else float(plain)
+                check_value(name, plain, numbers[name].metadata)
+            arrays[name] = jnp.asarray(value, now.dtype)
+            if arrays[name].shape != now.shape:
+                raise InputError(f"{name}: has shape {arrays[name].shape}; give {now.shape}")
+        return replace(self, **arrays)
 
     @staticmethod
     def _check_shape(entry, value: Array) -> None:
