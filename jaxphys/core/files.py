@@ -85,15 +85,15 @@ def output_file(
     """
     path = Path(path)
     if path.is_symlink():
-        raise InputError(f"--out {path}: is a link; name the file that it leads to")
+        raise InputError(f"{path}: is a link; name the file that it leads to")
     if not os.path.lexists(path):
         return path
     if not path.is_file():
-        raise InputError(f"--out {path}: is no file; name another")
+        raise InputError(f"{path}: is no file; name another")
     if any(os.path.exists(known) and os.path.samefile(known, path) for known in inputs):
-        raise InputError(f"--out {path}: is what is read; name another file")
+        raise InputError(f"{path}: is what is read; name another file")
     if not overwrite:
-        raise InputError(f"--out {path}: is there already; --overwrite replaces it")
+        raise InputError(f"{path}: is there already; --overwrite replaces it")
     return path
 
 

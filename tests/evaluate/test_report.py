@@ -74,7 +74,10 @@ def test_frames_are_read_in_order(finished):
 
 def test_few_frames_are_spread_evenly(finished, clip_folder):
     everything = evaluate(finished, clip=clip_folder, aesthetic=HEAD_FILES)["clip"]["by_frame"]
-    few = evaluate(finished, clip=clip_folder, aesthetic=HEAD_FILES, frames=3)
+    with pytest.raises(InputError, match="evaluation.json: is there already; --overwrite"):
+        evaluate(finished)
+    options = {"clip": clip_folder, "aesthetic": HEAD_FILES, "overwrite": True}
+    few = evaluate(finished, frames=3, **options)
     assert few["frames"] == {"total": FRAMES, "scored": 3}
     np.testing.assert_allclose(few["clip"]["by_frame"], everything[::2], atol=1e-6)
     assert evenly_spaced(4, None) == evenly_spaced(4, 9) == [0, 1, 2, 3]
@@ -84,7 +87,9 @@ def test_few_frames_are_spread_evenly(finished, clip_folder):
 
 def test_another_prompt_scores_otherwise(finished, clip_folder):
     own, other = (
-        evaluate(finished, clip=clip_folder, aesthetic=HEAD_FILES, prompt=prompt)["clip"]["cosine"]
+        evaluate(finished, clip=clip_folder, aesthetic=HEAD_FILES, prompt=prompt, overwrite=True)[
+            "clip"
+        ]["cosine"]
         for prompt in (None, "a rose")
     )
     assert abs(own - other) > 1e-3
