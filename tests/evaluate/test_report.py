@@ -74,7 +74,7 @@ def test_frames_are_read_in_order(finished):
 
 def test_few_frames_are_spread_evenly(finished, clip_folder):
     everything = evaluate(finished, clip=clip_folder, aesthetic=HEAD_FILES)["clip"]["by_frame"]
-    with pytest.raises(InputError, match="evaluation.json: is there already; --overwrite"):
+    with pytest.raises(InputError, match=r"evaluation\.json: is there already; --overwrite"):
         evaluate(finished)
     options = {"clip": clip_folder, "aesthetic": HEAD_FILES, "overwrite": True}
     few = evaluate(finished, frames=3, **options)
