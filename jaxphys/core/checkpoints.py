@@ -15,6 +15,7 @@ import jax
 import numpy as np
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.interrupt import held_interrupt
 from jaxphys.core.seals import is_sound, read_seal, remove, seal
 
 Tree = TypeVar("Tree")
@@ -104,6 +105,7 @@ class Checkpoints:
             self._sound.sort()
         return list(self._sound)
 
+    @held_interrupt()  # orbax works in threads, which must not outlive the program
     def save(self, step: int, arrays: Mapping[str, Any]) -> None:
         """Saves arrays by name; those of the oldest step too many go once the new ones are whole.
 
@@ -131,6 +133,7 @@ class Checkpoints:
             ) from error
         self._sound = left
 
+    @held_interrupt()
     def load(self, step: int) -> dict[str, np.ndarray]:
         """The arrays of one of the `steps`."""
         import orbax.checkpoint as ocp

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from jaxphys.core.checkpoints import fingerprint
 from jaxphys.core.files import aside_path
+from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.core.run_folder import RunFolder, run_folder
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.gaussians.ply import write_ply
 from jaxphys.mpm.rollout import SimulationError
 from jaxphys.pipeline.draw import deformed_gaussians
 from jaxphys.pipeline.film import Artist, film
-from jaxphys.pipeline.interrupt import deferred_interrupt
 from jaxphys.pipeline.output import Timing, write_lines
 from jaxphys.pipeline.record import Record, recorded
 from jaxphys.pipeline.resume import FOLDER, MotionCheckpoint

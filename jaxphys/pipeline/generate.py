@@ -13,13 +13,13 @@ import numpy as np
 from jaxphys.core.checkpoints import Checkpoints, by_name, fingerprint, from_names
 from jaxphys.core.errors import InputError
 from jaxphys.core.files import read_json, write_json
+from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.core.run_folder import RunFolder, run_folder
 from jaxphys.core.seals import is_sound, seal
 from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.gaussians.ply import read_ply, write_ply
 from jaxphys.guidance.prompts.refine import Refinement, check_prompt, refine
 from jaxphys.pipeline.animate import Watch, animate_in, products
-from jaxphys.pipeline.interrupt import deferred_interrupt
 from jaxphys.pipeline.output import Timing
 from jaxphys.pipeline.record import SAVE_EVERY
 from jaxphys.pipeline.resume import FOLDER

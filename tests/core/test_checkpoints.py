@@ -2,12 +2,14 @@
 
 import os
 import shutil
+import signal
 from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxphys.core.checkpoints as checkpoints_module
 from jaxphys.core.checkpoints import Checkpoints, by_name, fingerprint, from_names
 from jaxphys.core.errors import InputError
 
@@ -193,3 +195,17 @@ def test_fingerprint_sees_every_number_shape_and_type():
         fingerprint(b"x", b"y", ARRAYS),
     ]
     assert len({same, *changed}) == 8
+
+
+def test_an_interrupt_while_saving_counts_when_all_is_whole(tmp_path, monkeypatch):
+    """Orbax's threads would go on otherwise, and fail when the program ends."""
+    sealed = checkpoints_module.seal
+
+    def interrupted(*arguments, **options):
+        os.kill(os.getpid(), signal.SIGINT)
+        sealed(*arguments, **options)
+
+    monkeypatch.setattr(checkpoints_module, "seal", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Checkpoints(tmp_path, "a").save(4, later(4))
+    assert Checkpoints(tmp_path, "a").newest()[1]["b"] == 4

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from jaxphys.pipeline.interrupt import deferred_interrupt
+from jaxphys.core.interrupt import deferred_interrupt
 
 PROGRAM = """
 import os, signal, sys
@@ -15,7 +15,7 @@ import numpy as np
 import jaxphys.cli.main as cli
 from jaxphys.core.files import atomic_path
 from jaxphys.core.run_folder import run_folder
-from jaxphys.pipeline.interrupt import deferred_interrupt
+from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.pipeline.video import VideoWriter
 
 def command(folder: str) -> int:

@@ -1,4 +1,4 @@
-"""Ctrl-C between frames rather than in the middle of one."""
+"""Ctrl-C where it does no harm: between frames, and not in the middle of a file."""
 
 import signal
 import threading
@@ -32,3 +32,23 @@ def deferred_interrupt() -> Iterator[Callable[[], bool]]:
         yield lambda: asked > 0
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def held_interrupt() -> Iterator[None]:
+    """Ctrl-C inside counts only at the end of the block: for what is short, and must be whole.
+
+    Outside the main thread nothing changes.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before, came = signal.getsignal(signal.SIGINT), []
+    signal.signal(signal.SIGINT, lambda number, frame: came.append((number, frame)))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+        if callable(before):
+            for arguments in came:
+                before(*arguments)
