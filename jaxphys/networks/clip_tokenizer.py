@@ -52,7 +52,7 @@ class ClipTokenizer:
             id for id in vocabulary.values() if type(id) is not int or not 0 <= id < MOST_PIECES
         ]
         if wrong:
-            raise InputError(f"{source}: {shown(wrong[0])} is no number that a piece can have")
+            raise InputError(f"{source}: is damaged: a piece has the number {shown(wrong[0])}")
         try:
             model = models.BPE(vocabulary, merges, end_of_word_suffix="</w>", unk_token=END)
         except Exception as error:  # the library raises nothing narrower

@@ -72,7 +72,7 @@ def test_variant_is_stated():
 @pytest.mark.parametrize(
     "name, message",
     [
-        ("config.json", r"config.json: cannot be read"),
+        ("config.json", r"config.json: no such file"),
         ("vocab.json", r"holds neither vocab.json"),
         ("model.safetensors", r"has no model.safetensors"),
     ],

@@ -78,7 +78,7 @@ def command_line(folder: Path, random: Random) -> list[str]:
         for _ in range(0 if kind is None else 3 if flag == "--background" else 1):
             value = str(folder / random.choice(FILES)) if kind == "file" else random.choice(kind)
             arguments.append(value)
-    if command == "plan" and "--material" in arguments and len(arguments) < 4:
+    if command == "plan" and "--object" not in arguments:
         arguments += ["--object", str(folder / "none.ply")]
     if random.random() < 0.05:
         arguments.insert(random.randrange(len(arguments) + 1), random.choice(("--traceback", "-x")))

@@ -100,7 +100,7 @@ def test_one_string_is_refused(folder):
         ("merges.txt", "#version: 0.2\na b c\n", r"a merge is not of two pieces"),
         ("merges.txt", "#version: 0.2\nnot there\n", r"vocab.json: is damaged: .*not"),
         ("merges.txt", None, r"merges.txt: is missing"),
-        ("vocab.json", "{", r"vocab.json: is not JSON"),
+        ("vocab.json", "{", r"vocab.json: not valid JSON"),
         ("vocab.json", None, r"holds neither vocab.json"),
         ("vocab.json", '{"a": 0}', rf"vocab.json: '{re.escape(START)}', the bos_token, is not"),
     ],
