@@ -17,7 +17,8 @@ teapot"). "=part" is the colour of that part unless said; a leading "!" means ne
 tyre). Options, all read as `o.name`, the unmarked value being the default:
 
     sizes   adjectives of a part: "with a long spout"
-    forms   adjectives of the whole: "a tall teapot"; words alone give themselves: "plain|striped"
+    forms   adjectives of the whole: "a tall teapot"; words alone give themselves, and the default is
+            a first "plain" or the one with a star: "plain|striped", "*striped|plain"
     counts  how many, "1|2|3": "with three layers"
     extras  the chance that something is there: "with a saucer"
 """
@@ -96,7 +97,8 @@ def read_values(name: str, kind: str, text: str) -> dict:
         if kind == "count":
             values[COUNTS[int(value)]] = int(value)
         elif isinstance(value, str):  # a word alone stands for itself; the first is the default
-            values["" if index == 0 and value in ("plain", "none") else entry.strip()] = entry.strip()
+            word = entry.strip().removeprefix("*")
+            values["" if entry.startswith("*") or (index == 0 and word == "plain") else word] = word
         else:
             values[words] = float(value)
     if kind == "size" and "" not in values:

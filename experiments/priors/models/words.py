@@ -46,7 +46,7 @@ def with_article(phrase: str, noun: str) -> str:
 def called(kind: Kind, choice: Choice, part: str) -> str:
     """A part's name as it is said: the pattern's is what it consists of."""
     if part == "pattern":
-        return next(STYLES[word] for word in choice.words.values() if word in STYLES)
+        return next(STYLES[value] for value in choice.values.values() if value in STYLES)
     return part.replace("_", " ")
 
 

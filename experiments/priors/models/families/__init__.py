@@ -2,12 +2,17 @@
 
 from experiments.priors.models.families import (
     animals,
+    buildings,
     creatures,
     food,
     fruit,
+    furniture,
+    household,
     kitchen,
     plants,
     sweets,
+    tools,
+    vehicles,
 )
 
-__all__ = ["animals", "creatures", "food", "fruit", "kitchen", "plants", "sweets"]
+__all__ = ["animals", "buildings", "creatures", "food", "fruit", "furniture", "household", "kitchen", "plants", "sweets", "tools", "vehicles"]

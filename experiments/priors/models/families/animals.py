@@ -1,4 +1,5 @@
 """Animals on four legs."""
+
 import numpy as np
 
 from experiments.priors.models.families.common import (
@@ -97,7 +98,7 @@ def horse(o, rng):
 @kind("cow", "animals", also=("dairy cow",),
       colours=dict(hide="white|brown|black", spots="black|brown", muzzle="pink", legs="=hide", horns="cream",
                    udder="pink", ears="=hide", hooves="!dark grey", eyes="!black"),
-      sizes=dict(horns="short 0.7|1|long 1.8"), forms=dict(style="spotted|plain"))
+      sizes=dict(horns="short 0.7|1|long 1.8"), forms=dict(style="*spotted|plain"))
 def cow(o, rng):
     parts, head = beast(1.05, 0.27, 0.36, 0.07, 0.16, 28, 0.17, 0.12, 0.7, paws=False, droop=30)
     spots = near(rng.uniform((-0.5, -0.3, 0.3), (0.5, 0.3, 0.9), (11, 3)), 0.16)

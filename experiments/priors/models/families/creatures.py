@@ -1,4 +1,5 @@
 """Birds, sea animals, reptiles and small creatures."""
+
 import numpy as np
 
 from experiments.priors.models.families.common import (
@@ -186,13 +187,13 @@ def starfish(o, rng):
     return dict(skin=[arm.around(o.arms), ball(0.15, 0.15, 0.09).at(z=0.06)], dots=bump.around(o.arms), arms=[])
 
 
-@kind("turtle", "animals", also=("tortoise",), colours=dict(skin="light green|green", shell="brown|dark green|green", belly="cream", pattern="light brown|light green", eyes="!black"), sizes=dict(shell="small 0.85|1|large 1.2"))
+@kind("turtle", "animals", also=("tortoise",), colours=dict(skin="light green|green", shell="brown|dark green|green", belly="cream", plates="light brown|light green", eyes="!black"), sizes=dict(shell="small 0.85|1|large 1.2"))
 def turtle(o, rng):
     s = o.shell
     dome = lathe([(0, 0.1), (0.36 * s, 0.1), (0.39 * s, 0.15), (0.34 * s, 0.27), (0.2 * s, 0.37 * s), (0, 0.4 * s)]).scale(1.1, 0.9, 1)
     cells = lambda u, v, p: np.sort(-((p[:, None] - golden_directions(34) * (0.37 * s, 0.37 * s, 0.33 * s) - (0, 0, 0.1)) ** 2).sum(-1), 1)[:, -1] < -0.0042  # noqa: E731
     return dict(skin=[limb((0.3, 0, 0.18), (0.52, 0, 0.28), 0.09), ball(0.12, 0.1, 0.1).at(0.56, 0, 0.3), *[ball(0.13, 0.085, 0.075).turn("z", s1 * a).at(x, s1 * 0.28, 0.08) for x, a in ((0.28, 30), (-0.26, -30)) for s1 in (-1, 1)], cone(0.05, 0.16).turn("y", -100).at(-0.38, 0, 0.12)],
-                shell=dome.coat("pattern", cells), belly=cylinder(0.33, 0.05).at(z=0.07), eyes=eyes(0.63, 0.07, 0.34, 0.022))
+                shell=dome.coat("plates", cells), belly=cylinder(0.33, 0.05).at(z=0.07), eyes=eyes(0.63, 0.07, 0.34, 0.022))
 
 
 @kind("frog", "animals", also=("toad",), colours=dict(skin="green|light green", belly="light green|cream", legs="=skin", eyes="white|yellow", pupils="!black", spots="dark green"), forms=dict(style="plain|spotted"))

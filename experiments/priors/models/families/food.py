@@ -1,4 +1,5 @@
 """Savoury food."""
+
 import numpy as np
 
 from experiments.priors.models.families.common import (

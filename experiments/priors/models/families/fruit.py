@@ -1,4 +1,5 @@
 """Fruit and vegetables."""
+
 import numpy as np
 
 from experiments.priors.models.families.common import (
@@ -267,7 +268,7 @@ def avocado(o, rng):
 @kind("coconut", "fruit", also=("coconut half",), colours=dict(shell="brown|dark brown", flesh="white"))
 def coconut(o, rng):
     fine = ripples(rng, 8)
-    bowl = lathe([(0, -0.42), (0.25, -0.35), (0.42, 0), (0.42, 0.02)]).shade(mottled(fine, 0.16))
-    meat = lathe([(0.41, 0.0), (0.4, 0.035), (0.33, 0.035), (0.24, -0.2), (0, -0.28)])
+    bowl = lathe([(0, -0.42), (0.25, -0.35), (0.42, 0), (0.42, 0.02), (0.4, 0.02), (0.24, -0.3), (0, -0.37)]).shade(mottled(fine, 0.16))
+    meat = lathe([(0, -0.39), (0.24, -0.32), (0.405, 0.0), (0.4, 0.035), (0.33, 0.035), (0.24, -0.2), (0, -0.28)])
     whole = ball(0.4).at(-0.5, -0.5, 0.02).shade(mottled(fine, 0.16))
     return dict(shell=[bowl.turn("y", 25).at(0.1, 0.2, 0), whole.at(0.15, -0.05, 0)], flesh=meat.turn("y", 25).at(0.1, 0.2, 0))

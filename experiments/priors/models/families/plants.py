@@ -1,4 +1,5 @@
 """Flowers, trees and what else grows."""
+
 import numpy as np
 
 from experiments.priors.models.families.common import (
@@ -96,7 +97,7 @@ def tulip(o, rng):
     return together(tulip_cup(0.19, 0.42), dict(stem=tube([(0, 0, -long), (0, 0.015, -0.5 * long), (0, 0, 0.04)], 0.032), leaves=blade))
 
 
-@kind("mushroom", "plants", also=("toadstool",), colours=dict(cap="red|brown|light brown", spots="white", stem="cream|white"), sizes=dict(stem="short 0.65|1|long 1.4", cap="small 0.75|1|large 1.25"), forms=dict(style="spotted|plain"))
+@kind("mushroom", "plants", also=("toadstool",), colours=dict(cap="red|brown|light brown", spots="white", stem="cream|white"), sizes=dict(stem="short 0.65|1|long 1.4", cap="small 0.75|1|large 1.25"), forms=dict(style="*spotted|plain"))
 def mushroom(o, rng):
     h, w = 0.5 * o.stem, o.cap
     cap = lathe([(0, 0.03), (0.38 * w, 0.0), (0.46 * w, 0.07), (0.36 * w, 0.28), (0.18 * w, 0.4), (0, 0.42)]).coat("stem", lambda u, v, p: (v < 0.36) & (p[:, 2] < 0.06))

@@ -1,4 +1,5 @@
 """Cakes, ice cream and other sweet things."""
+
 import numpy as np
 
 from experiments.priors.models.families.common import (
