@@ -20,11 +20,6 @@ def even(count: int) -> np.ndarray:
     return np.linspace(0, 1, count + 1)
 
 
-def power(value: np.ndarray, exponent: float) -> np.ndarray:
-    """|value|^exponent with the sign of `value`."""
-    return np.sign(value) * np.abs(value) ** exponent
-
-
 def columns(*coordinates) -> np.ndarray:
     """Points (n, 3) of their coordinates."""
     return np.stack(np.broadcast_arrays(*coordinates), -1)
@@ -108,19 +103,14 @@ def cushion(length: float, width: float, height: float, square: float = 4.0) -> 
     """A rounded box about the origin whose sides bulge; `square` 2 is an ellipsoid, 6 nearly a
     box.
     """
-    half, e = 0.5 * np.array([length, width, height]), 2.0 / square
+    half = 0.5 * np.array([length, width, height])
 
     def surface(u, v):
-        level = power(np.sin(np.pi * v), e)
-        return half * columns(
-            level * power(np.cos(TURN * u), e),
-            level * power(np.sin(TURN * u), e),
-            -power(np.cos(np.pi * v), e),
-        )
+        level = np.sin(np.pi * v)
+        unit = columns(level * np.cos(TURN * u), level * np.sin(TURN * u), -np.cos(np.pi * v))
+        return half * unit / ((np.abs(unit) ** square).sum(1, keepdims=True)) ** (1 / square)
 
-    return Solid(
-        surface, even(24), even(16), lambda p: (np.abs(p / half) ** square).sum(1) < 1
-    )
+    return Solid(surface, even(24), even(16), lambda p: (np.abs(p / half) ** square).sum(1) < 1)
 
 
 def lathe(profile, *, sharp: bool = False, waves=None, outline=None) -> Solid:
@@ -167,7 +157,8 @@ def lathe(profile, *, sharp: bool = False, waves=None, outline=None) -> Solid:
         share = np.hypot(p[:, 0], p[:, 1]) / around(np.arctan2(p[:, 1], p[:, 0]))
         return in_polygon(share, p[:, 2], polygon)
 
-    return Solid(surface, u_knots, knots_of(t, sharp), inside)
+    extremes = t[[line[:, 0].argmax(), line[:, 1].argmin(), line[:, 1].argmax()]]
+    return Solid(surface, u_knots, np.union1d(knots_of(t, sharp), extremes), inside)
 
 
 def cylinder(radius: float, height: float, top: float | None = None, bevel: float = 0.0) -> Solid:
@@ -422,11 +413,12 @@ def hull(stations, *, square: float = 2.0, sharp: bool = False) -> Solid:
     table = np.concatenate([line[:1], line, line[-1:]])
     table[[0, -1], 1] = 0
     table[[0, -1], 2:] = table[[0, -1], 2:].mean(1, keepdims=True)
-    e = 2.0 / square
 
     def surface(u, v):
         x, half, low, high = along(v, t, table).T
-        c, s = power(np.cos(TURN * u), e), power(np.sin(TURN * u), e)
+        c, s = np.cos(TURN * u), np.sin(TURN * u)
+        reach = (np.abs(c) ** square + np.abs(s) ** square) ** (-1 / square)
+        c, s = reach * c, reach * s
         return columns(x, half * c, 0.5 * (low + high) + 0.5 * (high - low) * s)
 
     xs = np.maximum.accumulate(line[:, 0]) + 1e-9 * np.arange(len(line))

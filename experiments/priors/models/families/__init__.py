@@ -3,16 +3,21 @@
 from experiments.priors.models.families import (
     animals,
     buildings,
+    clothes,
     creatures,
     food,
     fruit,
     furniture,
     household,
+    instruments,
     kitchen,
+    nature,
     plants,
+    sports,
     sweets,
     tools,
+    toys,
     vehicles,
 )
 
-__all__ = ["animals", "buildings", "creatures", "food", "fruit", "furniture", "household", "kitchen", "plants", "sweets", "tools", "vehicles"]
+__all__ = ["animals", "buildings", "clothes", "creatures", "food", "fruit", "furniture", "household", "instruments", "kitchen", "nature", "plants", "sports", "sweets", "tools", "toys", "vehicles"]

@@ -119,7 +119,7 @@ def pig(o, rng):
     g = 0.27 * o.girth
     parts, head = beast(0.9, g, 0.2, 0.075, 0.06, 20, 0.2, 0.08, 0.55, droop=8)
     disc = cylinder(0.11, 0.05, bevel=0.015).turn("y", 90).at(head[0] + 0.21, 0, head[2] - 0.03)
-    holes = near([(head[0] + 0.26, s * 0.04, head[2] - 0.03) for s in (-1, 1)], 0.025)
+
     curl = helix(0.05, 0.14, 1.6, 0.02).turn("y", -80).at(-0.44, 0, 0.42)
     return dict(skin=[*parts["body"], parts["muzzle"]], legs=parts["legs"], snout=disc.coat("dark red", lambda u, v, p: np.minimum(np.hypot(p[:, 0], p[:, 1] - 0.04), np.hypot(p[:, 0], p[:, 1] + 0.04)) < 0.022),
                 ears=ears(head, 0.19, 0.17, 0.09, out=32, back=-25), tail=curl, eyes=eyes(head[0] + 0.15, 0.09, head[2] + 0.07, 0.027))

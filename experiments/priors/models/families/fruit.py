@@ -99,7 +99,7 @@ def plum(o, rng):
 @kind("tomato", "fruit", colours=dict(skin="red", leaves="green", stalk="green"))
 def tomato(o, rng):
     body = lathe([(0, -0.34), (0.3, -0.3), (0.46, 0), (0.36, 0.28), (0.12, 0.33), (0, 0.27)], waves=(5, 0.03))
-    return dict(skin=body, leaves=foliage(0.3, 0.08, 72 * np.arange(5) + 20, 12, (0, 0, 0.29), 0.3), stalk=stalk(0.27, 0.16, 0.025))
+    return dict(skin=body, leaves=foliage(0.3, 0.08, 72 * np.arange(5) + 20, 18, (0, 0, 0.31), 0.25), stalk=stalk(0.27, 0.2, 0.028))
 
 
 @kind("cherry", "fruit", also=("pair of cherries", "cherries"), colours=dict(skin="red|dark red", stalk="green|brown", leaf="green"))

@@ -136,7 +136,7 @@ def padlock(o, rng):
 
 @kind("phone", "household", also=("smartphone", "mobile phone", "cell phone"), colours=dict(body="black|white|silver|red|blue", screen="!light blue", buttons="=body"))
 def phone(o, rng):
-    icons = lambda u, v, p: (np.abs((p[:, 1] * 9.5) % 1 - 0.5) < 0.27) & (np.abs((p[:, 2] * 9.5 + 0.3) % 1 - 0.5) < 0.27) & (p[:, 0] > 0.02)  # noqa: E731
+    icons = lambda u, v, p: (np.abs((p[:, 1] * 9.5) % 1 - 0.5) < 0.27) & (np.abs((p[:, 2] * 9.5 + 0.3) % 1 - 0.5) < 0.27) & (p[:, 0] > 0)  # noqa: E731
     face = block(0.02, 0.43, 0.86, 0.0).at(0.04)
     return each(dict(body=plate(oblong(0.5, 1.0, 0.08), 0.08, edge=0.015), screen=face.coat("white", lambda u, v, p: icons(u, v, p) & (p[:, 2] < 0.25)).coat("blue", lambda u, v, p: icons(u, v, p) & (np.sin(40 * p[:, 1] + 25 * p[:, 2]) > 0.2)), buttons=block(0.03, 0.02, 0.12).at(0, 0.255, 0.2), black=cylinder(0.045, 0.02).turn("y", -90).at(-0.04, 0.14, 0.38)), lambda s: s.turn("y", -10).turn("z", 15))
 
@@ -249,8 +249,8 @@ def toothbrush(o, rng):
 
 @kind("comb", "household", also=("hair comb",), colours=dict(comb="black|brown|pink|blue|red"))
 def comb(o, rng):
-    y = np.linspace(-0.46, 0.46, 24)
-    return each(dict(comb=[block(0.05, 1.0, 0.14, 0.02).at(z=0.1), block(0.03, 0.018, 0.24, 0.0).copies([(0, a, -0.06) for a in y[1:-1]]), block(0.045, 0.04, 0.26).copies([(0, y[0], -0.06), (0, y[-1], -0.06)])]), lambda s: s.turn("x", 15))
+    y = np.linspace(-0.46, 0.46, 14)
+    return each(dict(comb=[block(0.05, 1.0, 0.14, 0.02).at(z=0.1), block(0.03, 0.026, 0.24, 0.0).copies([(0, a, -0.06) for a in y[1:-1]]), block(0.045, 0.04, 0.26).copies([(0, y[0], -0.06), (0, y[-1], -0.06)])]), lambda s: s.turn("x", 15))
 
 
 @kind("toilet", "household", colours=dict(bowl="white|light blue|pink", seat="=bowl", tank="=bowl", lever="silver|golden"))
