@@ -13,10 +13,10 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+from experiments.priors.models.surfaces import sample
 from tqdm import tqdm
 
 from experiments.priors.models import MODELS, PRINCIPAL, build
-from experiments.priors.models.surfaces import sample
 
 from .prepare import SAMPLES, prepare, save, stable_hash
 

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import families  # noqa: F401  (declares the kinds)
-from .kinds import KINDS, Kind
-from .model import Model, finish
-from .solids import Parts, listed
-from .variation import Choice, choose, options_of, paints
-from .words import caption
+from experiments.priors.models import families  # noqa: F401  (declares the kinds)
+from experiments.priors.models.kinds import KINDS, Kind
+from experiments.priors.models.model import Model, finish
+from experiments.priors.models.solids import Parts, listed
+from experiments.priors.models.variation import Choice, choose, options_of, paints
+from experiments.priors.models.words import caption
 
 __all__ = ["KINDS", "PRINCIPAL", "Built", "Kind", "Sample", "build", "captions", "sample"]
 

@@ -1,5 +1,5 @@
-"""The registry: what a kind of object is called, what of it can have which colour, and how its shape
-may vary. A kind is a function of its options and a generator that returns parts by name:
+"""The registry: what a kind of object is called, what of it can have which colour, and how its
+shape may vary. A kind is a function of its options and a generator that returns parts by name:
 
     @kind(
         "teapot",
@@ -12,13 +12,13 @@ may vary. A kind is a function of its options and a generator that returns parts
     def teapot(o, rng):
         return dict(body=ball(0.4, 0.4, 0.35 * o.height), ...)
 
-Colours: for each part its usual colours, the first part giving the colour of the whole ("a blue
+Colours: for each part its usual ones, the first part giving the colour of the whole ("a blue
 teapot"). "=part" is the colour of that part unless said; a leading "!" means never another one (a
 tyre). Options, all read as `o.name`, the unmarked value being the default:
 
     sizes   adjectives of a part: "with a long spout"
-    forms   adjectives of the whole: "a tall teapot"; words alone give themselves, and the default is
-            a first "plain" or the one with a star: "plain|striped", "*striped|plain"
+    forms   adjectives of the whole: "a tall teapot"; words alone give themselves, and the default
+            is a first "plain" or the one with a star: "plain|striped", "*striped|plain"
     counts  how many, "1|2|3": "with three layers"
     extras  the chance that something is there: "with a saucer"
 """
@@ -29,8 +29,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from .palette import COLOURS
-from .solids import Parts
+from experiments.priors.models.palette import COLOURS
+from experiments.priors.models.solids import Parts
 
 Make = Callable[[SimpleNamespace, np.random.Generator], Parts]
 
@@ -140,9 +140,7 @@ def kind(
     def declare(make: Make) -> Make:
         if name in KINDS:
             raise ValueError(f"there are two kinds called {name!r}")
-        KINDS[name] = Kind(
-            name, family, also, usual, same, frozenset(fixed), options, make
-        )
+        KINDS[name] = Kind(name, family, also, usual, same, frozenset(fixed), options, make)
         return make
 
     return declare

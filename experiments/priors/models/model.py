@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .solids import Parts, Solid, listed
+from experiments.priors.models.solids import Parts, Solid, listed
 
 SMALL = 0.08  # of the longest side: what is smaller hides nothing
 EPSILON = 1e-4  # of a parameter, for the tangents
@@ -27,8 +27,8 @@ class Surface(NamedTuple):
 class Model:
     """Solids by part, in their builder's units, and the map to the common frame.
 
-    labels: (S,) the part or plain colour of each solid; colours: (3,) of each; textures: of each part whose
-    material has one, points (n, 3) in the solid's frame -> factors (n,).
+    labels: (S,) the part or plain colour of each solid; colours: (3,) of each; textures: of each
+    part whose material has one, points (n, 3) in the solid's frame -> factors (n,).
     """
 
     labels: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Where paint goes: functions of (u, v, points) in a solid's own frame, for `Solid.coat` and `shade`.
+"""Where paint goes: functions of (u, v, points) in a solid's frame, for `Solid.coat` and `shade`.
 
 `u` runs around lathes, tubes and balls, `v` along them (from the bottom up for balls; along the
 profile for lathes).
@@ -6,7 +6,7 @@ profile for lathes).
 
 import numpy as np
 
-from .palette import golden_directions
+from experiments.priors.models.palette import golden_directions
 
 AXIS = {"x": 0, "y": 1, "z": 2}
 

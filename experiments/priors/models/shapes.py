@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .solids import Solid
+from experiments.priors.models.solids import Solid
 
 TURN = 2 * np.pi
 
@@ -72,7 +72,7 @@ def along(at: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def in_polygon(x: np.ndarray, y: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Which points (n,) lie inside a closed polygon (K, 2): an odd number of edges to their right."""
+    """Which points (n,) lie in a closed polygon (K, 2): an odd number of edges to their right."""
     x0, y0 = corners.T
     x1, y1 = np.roll(corners, -1, 0).T
     slope = (x1 - x0) / np.where(y1 == y0, 1e-12, y1 - y0)
@@ -86,9 +86,7 @@ def ball(x: float, y: float | None = None, z: float | None = None, fine: int = 8
 
     def surface(u, v):
         level = np.sin(np.pi * v)
-        unit = columns(
-            level * np.cos(TURN * u), level * np.sin(TURN * u), -np.cos(np.pi * v)
-        )
+        unit = columns(level * np.cos(TURN * u), level * np.sin(TURN * u), -np.cos(np.pi * v))
         return radii * unit
 
     return Solid(surface, even(fine), even(fine), lambda p: ((p / radii) ** 2).sum(1) < 1)
@@ -130,7 +128,10 @@ def lathe(profile, *, sharp: bool = False, waves=None, outline=None) -> Solid:
     polygon = line if sharp else line[::2]
     if outline is None:
         count, depth = waves or (0, 0.0)
-        around, u_knots = (lambda angle: 1 + depth * np.cos(count * angle)), even(max(12, 2 * count))
+        around, u_knots = (
+            (lambda angle: 1 + depth * np.cos(count * angle)),
+            even(max(12, 2 * count)),
+        )
 
         def rim(u):
             return around(TURN * u) * np.stack([np.cos(TURN * u), np.sin(TURN * u)])
@@ -203,10 +204,7 @@ def oblong(length: float, width: float, corner: float = 0.0) -> np.ndarray:
         line = [(x, -y), (x, y), (-x, y), (-x, -y), (x, -y)]
         count = 8
         return np.concatenate(
-            [
-                np.linspace(line[k], line[k + 1], count, endpoint=False)
-                for k in range(4)
-            ]
+            [np.linspace(line[k], line[k + 1], count, endpoint=False) for k in range(4)]
         )
     bends = [
         np.stack([sx * (x - r) + r * np.cos(a), sy * (y - r) + r * np.sin(a)], -1)
@@ -246,7 +244,9 @@ def rounded(corners, count: int = 48) -> np.ndarray:
     return along(at, np.linspace(0, chord[-1], len(fine)), fine)
 
 
-def slab(outline, height: float, *, puff: float = 0.0, edge: float = 0.0, top: float = 1.0) -> Solid:
+def slab(
+    outline, height: float, *, puff: float = 0.0, edge: float = 0.0, top: float = 1.0
+) -> Solid:
     """The `outline` (K, 2), star-shaped about the origin, lying in x and y, from z = -height / 2 to
     height / 2.
 
@@ -315,7 +315,12 @@ def tube(path, radius, *, flat: float = 1.0, sharp: bool = False, sides: int = 8
     t = np.concatenate([[0], 0.02 + 0.96 * t, [1]])
     doubled = np.concatenate([[0], np.arange(len(centre)), [len(centre) - 1]]).astype(int)
     table = np.concatenate(
-        [centre[doubled], (width[:, None] * first)[doubled], (flat * width[:, None] * second)[doubled]], 1
+        [
+            centre[doubled],
+            (width[:, None] * first)[doubled],
+            (flat * width[:, None] * second)[doubled],
+        ],
+        1,
     )
     table[[0, -1], 3:] = 0
     stride = 1 if len(t) < 16 else 2

@@ -37,7 +37,7 @@ class Solid:
 
     def at(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> "Solid":
         """Shifted."""
-        return replace(self, offset=self.offset + (x, y, z))
+        return replace(self, offset=self.offset + np.array([x, y, z]))
 
     def mapped(self, matrix: np.ndarray) -> "Solid":
         """Under the linear map `matrix` (3, 3) about the origin."""

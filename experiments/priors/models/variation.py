@@ -9,10 +9,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from .kinds import Kind
-from .palette import BRIGHT, COLOURS, MATERIALS, jitter, texture
+from experiments.priors.models.kinds import Kind
+from experiments.priors.models.palette import BRIGHT, COLOURS, MATERIALS, jitter, texture
 
 UNUSUAL_WHOLE = 0.4  # chance that the whole has a colour that it does not usually have
+UNUSUAL_NATURE = 0.2  # the same of what grows or is eaten
+NATURE = {"animals", "plants", "fruit", "vegetables", "food", "sweets", "nature"}
 UNUSUAL_PARTS = (0.5, 0.35, 0.15)  # chances that none, one, two of the other parts do
 UNMARKED = (0.4, 0.4, 0.2)  # chances that none, one, two of sizes and forms are not the default
 VARIETY = 0.06  # relative spread of every number beyond what the words say
@@ -87,15 +89,14 @@ def choose_colours(kind: Kind, rng: np.random.Generator) -> tuple[dict[str, str]
     free = [part for part in kind.colours if part not in kind.fixed and part != kind.main]
     count = min(len(free), int(rng.choice(3, p=UNUSUAL_PARTS)))
     unusual = set(rng.choice(free, count, replace=False)) if count else set()
-    if kind.main not in kind.fixed and rng.random() < UNUSUAL_WHOLE:
+    chance = UNUSUAL_NATURE if kind.family in NATURE else UNUSUAL_WHOLE
+    if kind.main not in kind.fixed and rng.random() < chance:
         unusual.add(kind.main)
     colours = {}
     for part, usual in kind.colours.items():
         if part in unusual:
             others = MATERIALS if part == kind.main and rng.random() < 0.15 else BRIGHT
-            others = [
-                c for c in others if c not in usual and not held_out(kind.name, part, c)
-            ]
+            others = [c for c in others if c not in usual and not held_out(kind.name, part, c)]
             colours[part] = str(rng.choice(others))
         else:
             weights = np.array([2.0] + [1.0] * (len(usual) - 1))

@@ -6,10 +6,10 @@ caption that names no colour therefore goes with the usual ones.
 
 import numpy as np
 
-from .kinds import COUNTS, Kind
-from .palette import article
-from .patterns import STYLES
-from .variation import Choice
+from experiments.priors.models.kinds import COUNTS, Kind
+from experiments.priors.models.palette import article
+from experiments.priors.models.patterns import STYLES
+from experiments.priors.models.variation import Choice
 
 # Names of parts without an article.
 MASS = {
@@ -19,13 +19,16 @@ MASS = {
     "plumage", "grass", "earth", "fabric", "upholstery", "soil", "seaweed", "fish", "wood",
     "whipped cream", "ice", "ham", "bacon", "dough", "wax", "juice", "tea", "flesh", "paint",
 }  # fmt: skip
-ENDS_IN_S = {"bus", "cactus", "octopus", "glass", "walrus", "dress", "cross", "compass", "harness", "canvas", "mattress", "hippopotamus", "brass", "grass", "abacus", "lens", "moss"}
+ENDS_IN_S = {
+    "bus", "cactus", "octopus", "glass", "dress", "cross", "compass", "lens", "moss", "grass",
+}  # fmt: skip
 FINISHES = (
     "complete object, clear shape", "fine surface detail", "smooth surface", "soft edges", "glossy",
     "natural colours", "simple shapes", "clean lines", "matte finish", "high detail",
 )  # fmt: skip
 SAID_WHOLE, SAID_PART, SAID_EXTRA = 0.35, 0.2, 0.6  # chances to say what goes without saying
-IRREGULAR = {"leaves": "leaf", "berries": "berry", "cherries": "cherry", "candies": "candy", "branches": "branch", "shelves": "shelf", "strawberries": "strawberry", "benches": "bench"}
+IRREGULAR = {"leaves": "leaf", "berries": "berry", "branches": "branch", "shelves": "shelf"}
+IRREGULAR |= {"cherries": "cherry", "patties": "patty", "candies": "candy", "arches": "arch"}
 
 
 def is_plural(noun: str) -> bool:

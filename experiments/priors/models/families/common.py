@@ -10,6 +10,8 @@ from experiments.priors.models.shapes import (
     leaf,
     limb,
     petal,
+    plate,
+    refined,
     speck,
     spray,
     tube,
@@ -52,9 +54,12 @@ def beast(length=0.9, girth=0.22, legs=0.4, leg=0.07, neck=0.25, lift=45.0, head
     """
     half, z = 0.5 * length, legs + 0.75 * girth
     low, high = z - girth, z + girth
-    body = hull([(-half, 0.1 * girth, z, z + 0.2 * girth), (-0.92 * half, 0.75 * girth, low + 0.25 * girth, high),
-                 (-0.5 * half, 0.98 * girth, low, high), (0.3 * half, 0.95 * girth, low, high - 0.05 * girth),
-                 (0.85 * half, 0.8 * girth, low + 0.15 * girth, high), (half, 0.1 * girth, z, z + 0.3 * girth)])
+    body = hull([(-half, 0.1 * girth, z, z + 0.2 * girth),
+            (-0.92 * half, 0.75 * girth, low + 0.25 * girth, high),
+                 (-0.5 * half, 0.98 * girth, low, high), (0.3 * half, 0.95 * girth, low,
+                     high - 0.05 * girth),
+                 (0.85 * half, 0.8 * girth, low + 0.15 * girth, high), (half, 0.1 * girth, z,
+                     z + 0.3 * girth)])
     rise = np.deg2rad(lift)
     root = np.array([0.72 * half, 0, z + 0.25 * girth])
     centre = root + (neck + 0.5 * head) * np.array([np.cos(rise), 0, np.sin(rise)])
@@ -66,14 +71,16 @@ def beast(length=0.9, girth=0.22, legs=0.4, leg=0.07, neck=0.25, lift=45.0, head
     places = [(x, s * 0.55 * girth) for x in (-0.72 * half, 0.66 * half) for s in (-1, 1)]
     thick = [limb((x, y, z - 0.3 * girth), (x, y, leg), 1.25 * leg, 0.85 * leg) for x, y in places]
     if paws:
-        thick += [ball(1.25 * leg, leg, 0.7 * leg, fine=8).at(x + 0.3 * leg, y, 0.7 * leg) for x, y in places]
+        thick += [ball(1.25 * leg, leg, 0.7 * leg, fine=8).at(x + 0.3 * leg, y, 0.7 * leg) for x,
+            y in places]
     return dict(body=[body, *skull], muzzle=nose, legs=thick), centre
 
 
 def tail(x: float, z: float, length: float, radius: float, up: float = 0.6, tip=None) -> Solid:
     """A tail from the back of a body, curving up."""
     tip = 0.6 * radius if tip is None else tip
-    path = [(x, 0, z), (x - 0.45 * length, 0, z + 0.2 * up * length), (x - 0.8 * length, 0, z + up * length)]
+    path = [(x, 0, z), (x - 0.45 * length, 0, z + 0.2 * up * length),
+        (x - 0.8 * length, 0, z + up * length)]
     return tube(path, [radius, 0.9 * radius, tip])
 
 
@@ -100,7 +107,8 @@ def daisy(radius: float, count: int, wide: float = 0.3, heart: float = 0.34) -> 
 
 def tulip_cup(radius: float, height: float) -> Parts:
     """A closed cup of petals standing on the origin."""
-    cup = [(0, 0), (0.75 * radius, 0.15 * height), (radius, 0.45 * height), (0.72 * radius, 0.85 * height)]
+    cup = [(0, 0), (0.75 * radius, 0.15 * height), (radius, 0.45 * height),
+        (0.72 * radius, 0.85 * height)]
     blade = ball(0.16 * radius, 0.62 * radius, 0.5 * height, fine=8).turn("y", -12)
     petals = blade.at(0.68 * radius, 0, 0.52 * height).around(6)
     return dict(petals=[lathe([*cup, (0.5 * radius, 0.8 * height), (0, 0.75 * height)]), petals])
@@ -121,12 +129,33 @@ def bloom(rng: np.random.Generator, radius: float) -> Parts:
     return dict(petals=[*solids, heart.shade(lambda u, v, p: 0.62 + 0.1 * np.sin(30 * v + 12 * u))])
 
 
-def foliage(length: float, width: float, angles, rises, place=(0, 0, 0), droop=0.3, sizes=1.0) -> Solid:
+def foliage(length: float, width: float, angles, rises, place=(0, 0, 0), droop=0.3,
+    sizes=1.0) -> Solid:
     """Pointed leaves with a lighter rib."""
-    one = leaf(length, width, droop).shade(lambda u, v, p: 1.12 - 0.4 * np.minimum(np.abs(p[:, 1]) / width * 2, 0.6))
+    one = leaf(length, width, droop).shade(lambda u, v,
+        p: 1.12 - 0.4 * np.minimum(np.abs(p[:, 1]) / width * 2, 0.6))
     return spray(one, angles, rises, place=place, sizes=sizes)
 
 
 def seeds(places, up, size: float, long: float = 1.0) -> Solid:
     """Specks standing on a surface at `places` (K, 3) with normals `up` (K, 3)."""
     return speck(size, size * long, 0.6 * size).copies(places, up)
+
+
+def stalk(z: float, length: float = 0.16, radius: float = 0.02, lean: float = 0.05) -> Solid:
+    """The stalk on top of a fruit, from height z."""
+    return tube([(0, 0, z), (0.3 * lean, 0, z + 0.5 * length), (lean, 0, z + length)],
+        [radius, 0.8 * radius, 1.2 * radius])
+
+
+def gable(length: float, width: float, rise: float, over: float = 0.05) -> Solid:
+    """A saddle roof along x standing on z = 0."""
+    w = 0.5 * width + over
+    return plate(refined([(w, -rise / 3), (0, 2 * rise / 3), (-w, -rise / 3)]),
+        length + 2 * over).at(z=rise / 3)
+
+
+def tiles(size: float = 16):
+    """Rows of tiles or planks, for `shade`."""
+    return lambda u, v, p: 1 - 0.16 * ((p[:, 0] * size + p[:, 2] * size) % 1 < 0.12) - 0.1 * ((p[:,
+                2] * size) % 1 < 0.2)
