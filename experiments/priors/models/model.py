@@ -11,8 +11,10 @@ import numpy as np
 from experiments.priors.models.solids import Parts, Solid, listed
 
 SMALL = 0.08  # of the longest side: what is smaller hides nothing
+TOUCH = 0.003  # of the longest side: a surface nearer than this to another solid is covered by it
+DEEP = 0.012  # of the longest side: how deep a winding surface must lie in itself to be hidden
 EPSILON = 1e-4  # of a parameter, for the tangents
-SPARE = 1.5  # samples drawn for each one wanted, as some turn out to be hidden
+SPARE = 1.3  # samples drawn for each one wanted, as some turn out to be hidden
 
 
 class Surface(NamedTuple):
@@ -46,7 +48,7 @@ class Model:
         found, kept, wanted = [], 0, int(SPARE * count) + 16
         while kept < count:
             points, colours, normals, owner = self._draw(wanted, rng)
-            seen = ~self._hidden(points, owner)
+            seen = ~self._hidden(points, owner, normals)
             found.append([values[seen] for values in (points, colours, normals)])
             kept += int(seen.sum())
             wanted = int(1.2 * (count - kept) * len(seen) / max(seen.sum(), 1)) + 16
@@ -60,7 +62,8 @@ class Model:
     def inside(self, places: np.ndarray) -> np.ndarray:
         """Which places (N, 3) of the common frame lie inside some solid, (N,)."""
         places = np.asarray(places, float) / self.scale + self.centre
-        return self._hidden(places, np.full(len(places), -1), smallest=0.0)
+        nowhere = np.full(len(places), -1)
+        return self._hidden(places, nowhere, np.zeros_like(places), smallest=0.0)
 
     def _draw(self, count: int, rng: np.random.Generator):
         """Points, colours, normals of all surfaces, hidden or not, and the copy they lie on."""
@@ -100,10 +103,10 @@ class Model:
         colours = self._paint(index, u, v, own)
         if len(solid.linear) == 1:
             points = own @ solid.linear[0].T + solid.offset[0]
-            normal = normal @ cofactor(solid.linear)[0].T
+            normal = normal @ normal_maps(solid.linear)[0].T
         else:
             points = (solid.linear[copy] @ own[..., None])[..., 0] + solid.offset[copy]
-            normal = (cofactor(solid.linear)[copy] @ normal[..., None])[..., 0]
+            normal = (normal_maps(solid.linear)[copy] @ normal[..., None])[..., 0]
         length = np.sqrt((normal**2).sum(1, keepdims=True))
         normal = np.where(length > 1e-14, normal / np.maximum(length, 1e-14), (0.0, 0, 1))
         return points, normal, colours, copy
@@ -126,20 +129,28 @@ class Model:
                 colours = colours + weight * (paint - colours)
         return np.clip(colours, 0, 1)
 
-    def _hidden(self, points, owner, smallest: float = SMALL) -> np.ndarray:
-        """Which points lie inside a copy that is not their own."""
+    def _hidden(self, points, owner, normals, smallest: float = SMALL) -> np.ndarray:
+        """Which points are inside a copy that is not their own, or touch one, or are deep inside
+        their own winding one: places just outside of them are asked for.
+        """
         hidden, number = np.zeros(len(points), bool), 0
         size = smallest / self.scale
+        outside = points + TOUCH / self.scale * normals
         for solid, (low, high) in zip(self.solids, self.bounds, strict=True):
             copies = len(solid.linear)
             if solid.inside is not None:
                 for k in np.flatnonzero((high - low).max(1) > size):
-                    near = (points > low[k]) & (points < high[k])
-                    near = np.flatnonzero(near[:, 0] & near[:, 1] & near[:, 2])
-                    near = near[(owner[near] != number + k) & ~hidden[near]]
+                    near = (outside > low[k]) & (outside < high[k])
+                    near = np.flatnonzero(near[:, 0] & near[:, 1] & near[:, 2] & ~hidden)
+                    own = owner[near] == number + k
+                    if not solid.winds:
+                        near = near[~own]
                     if len(near):
+                        places = outside[near]
+                        if solid.winds:
+                            places = places + own[:, None] * (DEEP / self.scale * normals[near])
                         back = np.linalg.inv(solid.linear[k])
-                        hidden[near] = solid.inside((points[near] - solid.offset[k]) @ back.T)
+                        hidden[near] = solid.inside((places - solid.offset[k]) @ back.T)
             number += copies
         return hidden
 
@@ -151,12 +162,13 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)
 
 
-def cofactor(linear: np.ndarray) -> np.ndarray:
-    """The maps (K, 3, 3) of area vectors that belong to those of points: rows are cross products
-    of the other two.
+def normal_maps(linear: np.ndarray) -> np.ndarray:
+    """The maps (K, 3, 3) of outward area vectors that belong to those of points: their rows are
+    cross products of the other two, turned back where the map mirrors.
     """
     a, b, c = linear[:, 0], linear[:, 1], linear[:, 2]
-    return np.stack([cross(b, c), cross(c, a), cross(a, b)], 1)
+    rows = np.stack([cross(b, c), cross(c, a), cross(a, b)], 1)
+    return rows * np.sign((a * rows[:, 0]).sum(1))[:, None, None]
 
 
 def finish(parts: Parts, colours: Mapping, textures: Mapping) -> Model:
@@ -172,7 +184,7 @@ def finish(parts: Parts, colours: Mapping, textures: Mapping) -> Model:
         middles = 0.25 * (p00 + p10 + p01 + p11).reshape(-1, 3)
         # Of a closed surface this sum is three times the volume if the vectors point outward.
         signs.append(1.0 if (middles * vectors).sum() >= 0 else -1.0)
-        maps = cofactor(solid.linear)
+        maps = normal_maps(solid.linear)
         areas.append(np.sqrt(((vectors @ maps.transpose(0, 2, 1)) ** 2).sum(-1)))
         placed = corners @ solid.linear.transpose(0, 2, 1) + solid.offset[:, None]
         bounds.append((placed.min(1), placed.max(1)))

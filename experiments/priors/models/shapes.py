@@ -139,12 +139,17 @@ def lathe(profile, *, sharp: bool = False, waves=None, outline=None) -> Solid:
         corners = np.concatenate([outline, outline[:1]]).astype(float)
         closed, s = curve(corners, True)
         u_knots = s if len(s) > 12 else knots_of(s, True)
-        angles, lengths = np.arctan2(closed[:-1, 1], closed[:-1, 0]), np.hypot(*closed[:-1].T)
+        angles = np.arctan2(closed[:-1, 1], closed[:-1, 0])
         order = np.argsort(angles)
+        first = closed[:-1][order]
+        second = np.roll(first, -1, 0)
+        angles, edge = angles[order], second - first
+        area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
 
         def around(angle):
-            # Between two corners the outline is straight, so 1 / radius is not: fine corners help.
-            return np.interp(angle, angles[order], lengths[order], period=TURN)
+            # Where the ray at this angle meets its edge.
+            k = np.searchsorted(angles, angle, side="right") - 1
+            return area[k] / (np.cos(angle) * edge[k, 1] - np.sin(angle) * edge[k, 0])
 
         def rim(u):
             return along(u, s, closed).T
@@ -300,10 +305,13 @@ def frames_along(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, np.cross(tangent, first)
 
 
-def tube(path, radius, *, flat: float = 1.0, sharp: bool = False, sides: int = 8) -> Solid:
+def tube(
+    path, radius, *, flat: float = 1.0, sharp: bool = False, sides: int = 8, winds: bool = False
+) -> Solid:
     """About a curve through `path` (K, 3); `radius` a number or one per point of the path.
 
-    `flat` scales its upright extent (the one across the first normal): a strap is a flat tube.
+    `flat` scales its upright extent (the one across the first normal): a strap is a flat tube;
+    `winds` says that it may touch itself.
     """
     path = np.asarray(path, float)
     radii = np.broadcast_to(np.asarray(radius, float), (len(path),))
@@ -350,7 +358,7 @@ def tube(path, radius, *, flat: float = 1.0, sharp: bool = False, sides: int = 8
         a, b = (off * first[:-1]).sum(-1), (off * second[:-1]).sum(-1) / flat
         return (near & (a**2 + b**2 < r**2)).any(1)
 
-    return Solid(surface, even(sides), knots, inside)
+    return Solid(surface, even(sides), knots, inside, winds=winds)
 
 
 def limb(start, end, radius: float, tip: float | None = None) -> Solid:
@@ -402,7 +410,7 @@ def helix(radius: float, height: float, turns: float, thickness: float) -> Solid
     """A coil about z from z = 0."""
     t = np.linspace(0, 1, max(12, int(12 * turns)))
     path = columns(radius * np.cos(TURN * turns * t), radius * np.sin(TURN * turns * t), height * t)
-    return tube(path, thickness, sharp=True, sides=6)
+    return tube(path, thickness, sharp=True, sides=6, winds=True)
 
 
 def hull(stations, *, square: float = 2.0, sharp: bool = False) -> Solid:

@@ -24,6 +24,7 @@ class Solid:
     inside: points (n, 3) in its own frame -> (n,) bool; None: too thin to have an inside.
     coats: what is painted over the part's own colour, in order: (name of a part or colour, where),
         `where(u, v, points in the own frame)` the opacity (n,); the name None multiplies instead.
+    winds: whether it may run through itself, so that parts of it hide others.
     linear, offset: (K, 3, 3), (K, 3): the maps p -> linear p + offset of the K copies.
     """
 
@@ -32,6 +33,7 @@ class Solid:
     v: np.ndarray
     inside: Callable[[np.ndarray], np.ndarray] | None
     coats: tuple[tuple[str | None, Where], ...] = ()
+    winds: bool = False
     linear: np.ndarray = field(default_factory=lambda: np.eye(3)[None])
     offset: np.ndarray = field(default_factory=lambda: np.zeros((1, 3)))
 

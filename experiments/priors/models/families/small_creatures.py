@@ -77,7 +77,8 @@ def snake(o, rng):
     path = np.stack([r * np.cos(a), r * np.sin(a), 0.07 + 0.24 * t], -1)
     rise = np.array([(0.3, 0.05, 0.42), (0.3, 0.02, 0.6), (0.4, 0, 0.68)])
     body = tube(np.concatenate([path, rise]),
-        np.concatenate([np.linspace(0.02, 0.085, 8), np.full(18, 0.085), [0.08, 0.07, 0.065]]))
+        np.concatenate([np.linspace(0.02, 0.085, 8), np.full(18, 0.085),
+        [0.08, 0.07, 0.065]]), winds=True)
     band = lambda u, v, p: np.sin(110 * v) > 0.2
     return dict(skin=[body.coat("bands", band) if o.style == "banded" else body,
             ball(0.12, 0.09, 0.065).at(0.46, 0, 0.68)], eyes=eyes(0.51, 0.06, 0.72, 0.02),
