@@ -30,13 +30,11 @@ OBJECTS = {
 
 def model_gaussians(name: str, count: int, seed: int) -> Gaussians:
     """A parametric model as Gaussians: its vertex colours, no texture."""
-    model, _ = build(name, seed)
-    corners = model.colours[model.triangles]
-    opaque = np.ones((*corners.shape[:2], 1))
-    faces = len(model.triangles)
+    corners, colours = build(name, seed).model.triangles()
+    faces = len(corners)
     mesh = Mesh(
-        triangles=model.vertices[model.triangles],
-        colours=np.concatenate([corners, opaque], axis=-1),
+        triangles=corners,
+        colours=np.concatenate([colours, np.ones((faces, 3, 1))], axis=-1),
         uvs=np.zeros((faces, 3, 2)),
         textures=(),
         texture=np.full(faces, -1),

@@ -7,8 +7,8 @@ import numpy as np
 
 from experiments.priors.models import PRINCIPAL
 
-PRINCIPAL_SHARE = 0.4  # of all draws, however many variants of the principal models there are
-SHARES = {"parametric": 2.0, "furniture": 1.0, "emoji": 1.0}  # among the others, for each item
+SHARES = {"parametric": 0.75, "furniture": 0.15, "emoji": 0.1}  # of all draws, of what there is
+PRINCIPAL_WEIGHT = 4.0  # how much more often a principal kind is drawn than another
 
 
 @dataclass(frozen=True)
@@ -34,18 +34,22 @@ class Records:
     known: np.ndarray
 
     def weights(self) -> np.ndarray:
-        """(I,) how often each item is to be drawn, relative; zero for held-out ones."""
-        principal = {model.replace(" ", "_") for model in PRINCIPAL}
-        kind = np.array([name.partition("-")[0] for name in self.name])
-        model = np.array([name.partition("-")[2].rpartition("-")[0] for name in self.name])
-        chosen = (kind == "parametric") & np.isin(model, list(principal))
-        weight = np.array([SHARES.get(k, 1.0) for k in kind])
-        counts = {m: np.sum(chosen & (model == m) & ~self.held_out) for m in principal}
-        weight[chosen] = [1.0 / max(counts[m], 1) for m in model[chosen]]
-        weight[self.held_out] = 0.0
-        if weight[~chosen].sum() > 0 and weight[chosen].sum() > 0:
-            weight[chosen] *= PRINCIPAL_SHARE / weight[chosen].sum()
-            weight[~chosen] *= (1.0 - PRINCIPAL_SHARE) / weight[~chosen].sum()
+        """(I,) how often each item is to be drawn, relative; zero for held-out ones.
+
+        Sources have their `SHARES` and kinds count alike, however many variants there are of each.
+        """
+        source = np.array([name.partition("-")[0] for name in self.name])
+        kind = np.array([name.rpartition("-")[0] for name in self.name])
+        # Only of the parametric kinds are there variants; everything else is one of its kind.
+        group = np.where(source == "parametric", kind, self.name)
+        _, index, count = np.unique(group[~self.held_out], return_inverse=True, return_counts=True)
+        weight = np.zeros(len(self.name))
+        weight[~self.held_out] = 1.0 / count[index]
+        principal = [f"parametric-{kind.replace(' ', '_')}" for kind in PRINCIPAL]
+        weight[np.isin(kind, principal)] *= PRINCIPAL_WEIGHT
+        for name, share in SHARES.items():
+            if (total := weight[source == name].sum()) > 0:
+                weight[source == name] *= share / total
         return weight
 
     def text(self, items: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -15,9 +15,8 @@ import numpy as np
 from flax import nnx
 
 from experiments.priors.data.pictures import pictures
-from experiments.priors.data.prepare import SAMPLES, random_views, surface_points
+from experiments.priors.data.prepare import POINTS, lit_points, random_views
 from experiments.priors.models import build
-from experiments.priors.models.surfaces import sample
 from experiments.scorer.model import WEIGHTS, Scorer, embed, load
 from experiments.scorer.ranking import report, similarities, table
 from experiments.scorer.sentences import MODEL_NAMES, SENTENCES
@@ -64,9 +63,9 @@ def rendered_pictures(seeds: list[int], views: int = 8) -> np.ndarray:
         row = []
         for seed in seeds:
             rng = np.random.default_rng(seed)
-            mesh, _ = build(MODEL_NAMES[prompt], seed)
-            points = surface_points(*sample(mesh, SAMPLES, rng), rng)
-            row.append(pictures(*points, *random_views(rng, views)))
+            surface = build(MODEL_NAMES[prompt], seed).model.sample(POINTS + POINTS // 2, rng)
+            points, _, colours = lit_points(surface.points, surface.normals, surface.colours, rng)
+            row.append(pictures(points, colours, *random_views(rng, views)))
         rows.append(np.concatenate(row))
     return np.stack(rows)
 

@@ -15,8 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from experiments.priors.data.splat import camera_frame, pinholes
-from experiments.priors.models import MODELS, PRINCIPAL, build
-from experiments.priors.models.surfaces import sample
+from experiments.priors.models import KINDS, PRINCIPAL, build, captions
 from jaxphys.core.files import atomic_path, write_json
 
 RESOLUTION, SUPERSAMPLING = 64, 2
@@ -132,16 +131,19 @@ def mend(image: np.ndarray, depth: np.ndarray) -> None:
 def shots_of(name: str, seed: int) -> tuple[np.ndarray, list[str]]:
     """Pictures (8, 64, 64, 4) uint8 of one variant from around, and its captions."""
     rng = np.random.default_rng([seed, *name.encode()])
-    mesh, captions = build(name, seed)
-    surface = [values.astype(np.float32) for values in sample(mesh, SAMPLES, rng)]
+    built = build(name, seed)
+    points, colours, normals = (
+        values.astype(np.float32) for values in built.model.sample(SAMPLES, rng)
+    )
     turns = (np.arange(VIEWS) + rng.random(VIEWS)) / VIEWS
-    return np.stack([picture(*surface, random_shot(rng, t), rng) for t in turns]), captions
+    shots = [picture(points, normals, colours, random_shot(rng, t), rng) for t in turns]
+    return np.stack(shots), captions(built, 4, rng)
 
 
 def objects(part: str) -> list[tuple[str, int]]:
     """Names and seeds of the objects of the part "train" or "held_out"."""
     first, principal, others = SEEDS[part]
-    counts = {name: principal if name in PRINCIPAL else others for name in MODELS}
+    counts = {name: principal if name in PRINCIPAL else others for name in KINDS}
     return [(name, first + k) for name, count in counts.items() for k in range(count)]
 
 
@@ -153,9 +155,9 @@ def main() -> None:
     for part in SEEDS:
         images, items = [], []
         for name, seed in tqdm(objects(part), desc=part):
-            drawn, captions = shots_of(name, seed)
+            drawn, said = shots_of(name, seed)
             images.append(drawn)
-            items.append({"name": name, "seed": seed, "captions": captions})
+            items.append({"name": name, "seed": seed, "captions": said})
         with atomic_path(folder / f"{part}.npz") as aside:
             np.savez(aside, images=np.stack(images))
         write_json(folder / f"{part}.json", items)

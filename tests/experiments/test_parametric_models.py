@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from experiments.priors.models.surfaces import ellipsoid, sample
 
 from experiments.priors.data import splat
 from experiments.priors.data.pictures import pictures
 from experiments.priors.data.prepare import prepare
 from experiments.priors.models import MODELS, PRINCIPAL, build
-from experiments.priors.models.surfaces import ellipsoid, sample
 from jaxphys.guidance import views
 
 

@@ -12,9 +12,8 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from experiments.priors.data.prepare import POINTS, held_out
 from jaxphys.core.files import write_json
-
-from .prepare import POINTS, held_out
 
 
 def assemble(objects: Path, prepared: Path, encode) -> dict:
@@ -33,6 +32,7 @@ def assemble(objects: Path, prepared: Path, encode) -> dict:
     )
     points = np.empty((clouds, POINTS, 3), np.float16)
     colours = np.empty((clouds, POINTS, 3), np.uint8)
+    normals = np.empty((clouds, POINTS, 3), np.int8)
     captions, of_item, azimuth, elevation, known = {}, [], [], [], []
     start = 0
     for index, file in enumerate(tqdm(files, desc="gather")):
@@ -41,12 +41,13 @@ def assemble(objects: Path, prepared: Path, encode) -> dict:
             start += counts[index]
             if index < clouds:
                 points[index], colours[index] = data["points"], data["colours"]
+                normals[index] = data["normals"]
             of_item.append([captions.setdefault(str(c), len(captions)) for c in data["captions"]])
             azimuth.append(data["azimuth"])
             elevation.append(data["elevation"])
             known.append(np.full(counts[index], index < clouds))
     images.flush()
-    np.savez(aside / "points.npz", points=points, colours=colours)
+    np.savez(aside / "points.npz", points=points, colours=colours, normals=normals)
     np.savez(
         aside / "views.npz",
         item=np.repeat(np.arange(len(files), dtype=np.int32), counts),

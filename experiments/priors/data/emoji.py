@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from experiments.priors.data.pictures import straight
+from experiments.priors.data.prepare import Prepared, save
 from experiments.priors.models.palette import article
 from jaxphys.guidance.views import RESOLUTION
-
-from .pictures import straight
-from .prepare import Prepared, save
 
 GROUPS = {3: "animals", 4: "food", 5: "travel", 6: "activities", 7: "objects"}
 NOT_OBJECTS = {"place-geographic", "sky-weather", "time", "arrow", "place-map"}
@@ -70,8 +69,8 @@ def main() -> None:
         captions += [f"{article(label)}, {', '.join(tags[:3])}"] if tags else []
         image = frame(Image.open(pictures[code]).convert("RGBA"))[None]
         view = np.zeros(1, np.float32)
-        empty = np.zeros((0, 3))
-        record = Prepared(empty.astype(np.float16), empty.astype(np.uint8), image, view, view)
+        none = [np.zeros((0, 3), dtype) for dtype in (np.float16, np.int8, np.uint8)]
+        record = Prepared(*none, image, view, view)
         save(options.objects / f"emoji-{code}.npz", record, captions)
         count += 1
     print(f"{count} emoji")

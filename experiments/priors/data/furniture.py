@@ -20,10 +20,9 @@ from zipfile import ZipFile
 import numpy as np
 from tqdm import tqdm
 
+from experiments.priors.data import wavefront
+from experiments.priors.data.prepare import SAMPLES, prepare, save, stable_hash
 from experiments.priors.models.palette import COLOURS, article
-
-from . import wavefront
-from .prepare import SAMPLES, prepare, save, stable_hash
 
 NOT_A_NAME = {"blend swap", "scopia", "kator legaz", "reallusion", ""}
 # Words in a model's own licence note that go beyond attribution.

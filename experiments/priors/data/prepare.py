@@ -8,11 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from experiments.priors.data.pictures import pictures
+from experiments.priors.data.splat import bake_light, even_subset, visible_surface
 from jaxphys.core.files import atomic_path
 from jaxphys.guidance import views
-
-from .pictures import pictures
-from .splat import bake_light, even_subset, visible_surface
 
 SAMPLES = 60_000  # dense surface samples to find what can be seen
 POINTS = 4096  # of them kept, for the point prior and to draw pictures from
@@ -20,11 +19,12 @@ VIEWS = 16
 
 
 class Prepared(NamedTuple):
-    """Points (4096, 3) float16 in [-0.5, 0.5], colours (4096, 3) uint8, images (V, 64, 64, 4)
-    uint8, views (V,).
+    """Points (4096, 3) float16 in [-0.5, 0.5], their outward normals times 127 (4096, 3) int8,
+    colours (4096, 3) uint8, images (V, 64, 64, 4) uint8, views (V,).
     """
 
     points: np.ndarray
+    normals: np.ndarray
     colours: np.ndarray
     images: np.ndarray
     azimuth: np.ndarray
@@ -40,23 +40,40 @@ def random_views(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.n
     return azimuth, np.arcsin(rng.uniform(low, high, count))
 
 
-def surface_points(points, normals, colours, rng) -> tuple[np.ndarray, np.ndarray]:
-    """The lit points (4096, 3) float16 and colours (4096, 3) uint8 of what can be seen of dense
-    samples (N, 3) with normals and albedo in [0, 1], in the common frame.
+def lit_points(points, normals, colours, rng) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points (4096, 3) float16, normals times 127 (4096, 3) int8 and lit colours (4096, 3) uint8 of
+    samples (N, 3) of the outer surface with outward normals and albedo in [0, 1].
+    """
+    points, normals, colours = (np.asarray(a, np.float32) for a in (points, normals, colours))
+    chosen = even_subset(points, POINTS, rng)
+    lit = bake_light(colours[chosen], normals[chosen])
+    return (
+        points[chosen].astype(np.float16),
+        np.rint(127 * normals[chosen]).astype(np.int8),
+        np.rint(255 * lit).astype(np.uint8),
+    )
+
+
+def surface_points(points, normals, colours, rng) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`lit_points` of what can be seen of dense samples whose inner surfaces and wrong normals are
+    not known.
     """
     points, normals, colours = (np.asarray(a, np.float32) for a in (points, normals, colours))
     mask, outward = visible_surface(points, normals)
-    points, colours = points[mask], bake_light(colours, outward)[mask]
-    chosen = even_subset(points, POINTS, rng)
-    return points[chosen].astype(np.float16), np.rint(255 * colours[chosen]).astype(np.uint8)
+    return lit_points(points[mask], outward[mask], colours[mask], rng)
+
+
+def with_pictures(kept: tuple[np.ndarray, np.ndarray, np.ndarray], rng, views: int) -> Prepared:
+    """The points of `lit_points` with pictures from around."""
+    azimuth, elevation = (a.astype(np.float32) for a in random_views(rng, views))
+    points, _, colours = kept
+    return Prepared(*kept, pictures(points, colours, azimuth, elevation), azimuth, elevation)
 
 
 def prepare(points, normals, colours, seed: int) -> Prepared:
     """Points and pictures of dense samples, see `surface_points`."""
     rng = np.random.default_rng(seed)
-    azimuth, elevation = (a.astype(np.float32) for a in random_views(rng, VIEWS))
-    kept = surface_points(points, normals, colours, rng)
-    return Prepared(*kept, pictures(*kept, azimuth, elevation), azimuth, elevation)
+    return with_pictures(surface_points(points, normals, colours, rng), rng, VIEWS)
 
 
 def stable_hash(text: str) -> int:

@@ -65,6 +65,28 @@ class Model:
         nowhere = np.full(len(places), -1)
         return self._hidden(places, nowhere, np.zeros_like(places), smallest=0.0)
 
+    def triangles(self, pieces: int = 4) -> tuple[np.ndarray, np.ndarray]:
+        """Corners (T, 3, 3) in the common frame and their albedo (T, 3, 3): every surface with its
+        cells cut into `pieces` squared, hidden parts included.
+        """
+        corners, paints = [], []
+        for index, solid in enumerate(self.solids):
+            u, v = (np.interp(*fine(knots, pieces)) for knots in (solid.u, solid.v))
+            grid = [values.ravel() for values in np.meshgrid(u, v, indexing="ij")]
+            own = solid.surface(*grid)
+            colours = self._paint(index, *grid, own)
+            first = (np.arange(len(u) - 1)[:, None] * len(v) + np.arange(len(v) - 1)).ravel()
+            right, up, both = first + len(v), first + 1, first + len(v) + 1
+            faces = np.stack([[first, right, both], [first, both, up]]).transpose(0, 2, 1)
+            faces = faces.reshape(-1, 3)
+            for linear, offset in zip(solid.linear, solid.offset, strict=True):
+                flips = self.signs[index] * np.linalg.det(linear) < 0
+                around = faces[:, ::-1] if flips else faces
+                placed = (own @ linear.T + offset - self.centre) * self.scale
+                corners.append(placed[around])
+                paints.append(colours[around])
+        return np.concatenate(corners), np.concatenate(paints)
+
     def _draw(self, count: int, rng: np.random.Generator):
         """Points, colours, normals of all surfaces, hidden or not, and the copy they lie on."""
         sizes = [area.size for area in self.areas]
@@ -153,6 +175,12 @@ class Model:
                         hidden[near] = solid.inside((places - solid.offset[k]) @ back.T)
             number += copies
         return hidden
+
+
+def fine(knots: np.ndarray, pieces: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `np.interp` wants to cut each interval of `knots` into so many."""
+    at = np.arange(pieces * (len(knots) - 1) + 1) / pieces
+    return at, np.arange(len(knots)), knots
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ caption that names no colour therefore goes with the usual ones.
 import numpy as np
 
 from experiments.priors.models.kinds import COUNTS, Kind
-from experiments.priors.models.palette import article
+from experiments.priors.models.palette import COLOURS, article
 from experiments.priors.models.patterns import STYLES
 from experiments.priors.models.variation import Choice
 
@@ -34,7 +34,7 @@ IRREGULAR |= {"cherries": "cherry", "patties": "patty", "candies": "candy", "arc
 def is_plural(noun: str) -> bool:
     """Whether the head of a noun phrase is a plural: "pancakes", not "stack of pancakes"."""
     head = noun.split(" of ")[0].split(" with ")[0].split()[-1]
-    return head.endswith("s") and head not in ENDS_IN_S
+    return head in ("feet", "teeth") or (head.endswith("s") and head not in ENDS_IN_S)
 
 
 def singular(noun: str) -> str:
@@ -93,10 +93,24 @@ def listing(phrases: list[str]) -> str:
     return phrases[0] if len(phrases) == 1 else f"{', '.join(phrases[:-1])} and {phrases[-1]}"
 
 
+COLOUR_WORDS = {word for name in COLOURS for word in name.split()} | {"gold"}
+
+
+def nouns_for(kind: Kind, colour: str, said: str) -> list[str]:
+    """What a thing of this colour may be called: "brown bear" if it is brown and nobody says so."""
+
+    def fits(noun: str) -> bool:
+        words = COLOUR_WORDS.intersection(noun.split())
+        return not words or (not said and words <= {colour, colour.removesuffix("en")})
+
+    return [kind.name, *filter(fits, kind.also)]
+
+
 def caption(kind: Kind, choice: Choice, present: set[str], rng: np.random.Generator) -> str:
     """One caption of a variant of which the parts `present` are there."""
     said = Said(kind, choice, present, rng)
-    noun = kind.name if rng.random() < 0.6 else str(rng.choice(kind.nouns))
+    nouns = nouns_for(kind, choice.colours[kind.main], said.colour)
+    noun = kind.name if rng.random() < 0.6 else str(rng.choice(nouns))
     style = rng.random()
     bare = rng.random() < 0.15
     head = noun if bare else with_article(noun, noun)
