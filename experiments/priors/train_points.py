@@ -12,6 +12,7 @@ from flax import nnx
 from jax import Array
 
 from experiments.priors import prompts, records
+from experiments.priors.fresh import fresh_clouds, kind_of
 from experiments.priors.training import Task, arguments, train
 from jaxphys.guidance.bundled.point_prior import (
     PointCondition,
@@ -20,6 +21,7 @@ from jaxphys.guidance.bundled.point_prior import (
     from_frame,
     to_frame,
 )
+from jaxphys.guidance.bundled.text_encoder import load_text_encoder
 from jaxphys.guidance.diffusion.samplers import karras_times, sample_heun
 from jaxphys.guidance.diffusion.schedule import guided
 
@@ -85,6 +87,9 @@ def sheet(text: np.ndarray, seed: int, count: int = 2048):
 def main() -> None:
     parser = arguments(__doc__, batch=12)
     parser.add_argument("--points", type=int, default=1024, help="points a sample")
+    parser.add_argument(
+        "--fresh", action="store_true", help="new variants of parametric kinds at every step"
+    )
     options = parser.parse_args()
     data = records.load(options.data)
     clouds = len(data.points)
@@ -101,12 +106,27 @@ def main() -> None:
             "text": data.text(items, rng),
         }
 
+    kinds = [kind_of(name) for name in data.name[:clouds]]
+    encode = load_text_encoder() if options.fresh else None
+
+    def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
+        items = choose(rng, count)
+        batch = gather(items, rng)
+        if encode is not None:
+            new = [row for row, item in enumerate(items) if kinds[item] is not None]
+            names = [kinds[items[row]] for row in new]
+            batch["points"][new], batch["colours"][new], captions = fresh_clouds(
+                names, options.points, rng
+            )
+            batch["text"][new] = encode(captions)
+        return batch
+
     rng = np.random.default_rng(options.seed)
     kept_out = np.flatnonzero(data.held_out[:clouds])
     kept_out = rng.choice(kept_out, min(128, len(kept_out)), replace=False)
     task = Task(
         module=PointPrior(PointPriorConfig(dtype=options.dtype), rngs=nnx.Rngs(options.seed)),
-        draw=lambda rng, count: gather(choose(rng, count), rng),
+        draw=draw,
         prepare=prepare,
         drop=drop,
         held_out=gather(np.sort(kept_out), rng),

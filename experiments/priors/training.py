@@ -10,6 +10,7 @@ import json
 import signal
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -204,12 +205,17 @@ def train(task: Task, options: argparse.Namespace) -> None:
         picture = task.picture(with_parameters(task.module, state.average))
         Image.fromarray(picture).save(run / f"samples-{int(state.step):06d}.png")
 
+    def batch_of(number: int) -> Batch:
+        return task.draw(np.random.default_rng((options.seed, number)), options.batch)
+
     started = last_report = last_save = time.monotonic()
     losses: list[Array] = []
-    with stop_on_signal() as stopping:
+    # The host draws the next batch while the device works on this one.
+    with stop_on_signal() as stopping, ThreadPoolExecutor(1) as ahead:
+        coming = ahead.submit(batch_of, int(state.step))
         while not stopping() and time.monotonic() - started < 60 * options.minutes:
-            generator = np.random.default_rng((options.seed, int(state.step)))
-            state, value = step(state, task.draw(generator, options.batch))
+            batch, coming = coming.result(), ahead.submit(batch_of, int(state.step) + 1)
+            state, value = step(state, batch)
             losses.append(jax.block_until_ready(value))
             now = time.monotonic()
             if now - last_report > 60 * options.report_minutes:

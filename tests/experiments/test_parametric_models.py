@@ -1,84 +1,27 @@
-"""The parametric models that the priors learn from, and the pictures made of them."""
+"""The pictures and points that the priors learn from, made of the parametric kinds."""
 
 import numpy as np
-import pytest
-from experiments.priors.models.surfaces import ellipsoid, sample
 
+from experiments.priors import records
 from experiments.priors.data import splat
+from experiments.priors.data.parametric import prepared
 from experiments.priors.data.pictures import pictures
-from experiments.priors.data.prepare import prepare
-from experiments.priors.models import MODELS, PRINCIPAL, build
+from experiments.priors.fresh import fresh_clouds, kind_of
+from experiments.priors.models import PRINCIPAL
 from jaxphys.guidance import views
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_is_finite_centred_and_of_unit_length(name):
-    mesh, captions = build(name, 3)
-    low, high = mesh.vertices.min(0), mesh.vertices.max(0)
-    assert np.isfinite(mesh.vertices).all()
-    np.testing.assert_allclose(low + high, 0, atol=1e-9)
-    np.testing.assert_allclose((high - low).max(), 1)
-    assert mesh.colours.min() >= 0 and mesh.colours.max() <= 1
-    assert mesh.triangles.min() >= 0 and mesh.triangles.max() < len(mesh.vertices)
-    assert len(captions) == len(set(captions)) >= 2
-    assert all(caption == caption.strip() and caption for caption in captions)
-
-
-def test_is_the_same_for_the_same_seed_only():
-    for name in PRINCIPAL:
-        first, again, other = build(name, 5), build(name, 5), build(name, 6)
-        np.testing.assert_array_equal(first[0].vertices, again[0].vertices)
-        np.testing.assert_array_equal(first[0].colours, again[0].colours)
-        assert first[1] == again[1]
-        assert not np.array_equal(first[0].colours, other[0].colours)
-
-
-@pytest.mark.parametrize(
-    "name, test",
-    [
-        ("strawberry", lambda r, g, b: (r > g + 0.25) & (r > b + 0.25)),  # red
-        ("burger", lambda r, g, b: (r > g) & (g > b)),  # brown to yellow
-        ("salmon nigiri", lambda r, g, b: r > b + 0.2),  # orange, beside white rice
-        ("pancakes", lambda r, g, b: (r > g) & (g > b + 0.1)),  # golden
-        ("cactus", lambda r, g, b: (g > r) & (g > b)),  # green
-        ("carrot", lambda r, g, b: (r > g + 0.2) & (g > b)),  # orange
-    ],
-)
-def test_has_its_colour(name, test):
-    for seed in range(4):
-        mesh, _ = build(name, seed)
-        points, normals, colours = sample(mesh, 4000, np.random.default_rng(0))
-        visible, _ = splat.visible_surface(
-            points.astype(np.float32), normals.astype(np.float32), directions=8, resolution=32
-        )
-        assert test(*colours[visible].T).mean() > 0.35
-
-
-def test_captions_name_the_drawn_colour():
-    for seed in range(20):
-        mesh, captions = build("sponge", seed)
-        if any(caption.startswith("a light blue") for caption in captions):
-            red, _, blue = mesh.colours.mean(0)
-            assert blue > red
-            return
-    pytest.fail("no blue sponge among twenty")
-
-
-def test_samples_lie_on_the_surface_with_its_normals():
-    ball = ellipsoid((0, 0, 0), 0.5, (1, 0, 0), 96, 64)
-    points, normals, colours = sample(ball, 5000, np.random.default_rng(0))
-    radius = np.linalg.norm(points, axis=1)
-    np.testing.assert_allclose(radius, 0.5, atol=2e-3)
-    assert np.abs((normals * points).sum(1) / radius).min() > 0.99
-    np.testing.assert_allclose(points.mean(0), 0, atol=0.01)
-    np.testing.assert_array_equal(colours, np.tile([1.0, 0, 0], (5000, 1)))
+def sphere(radius, count, rng):
+    """Points and normals (count, 3) of a sphere about the origin."""
+    unit = rng.normal(size=(count, 3))
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    return radius * unit, unit
 
 
 def test_what_is_inside_is_left_out_and_normals_point_outward():
     rng = np.random.default_rng(0)
-    outer = sample(ellipsoid((0, 0, 0), 0.5, (1, 0, 0)), 60000, rng)
-    inner = sample(ellipsoid((0, 0, 0), 0.3, (0, 0, 1)), 15000, rng)
-    points, normals, _ = (
+    outer, inner = sphere(0.5, 60000, rng), sphere(0.3, 15000, rng)
+    points, normals = (
         np.concatenate(pair).astype(np.float32) for pair in zip(outer, inner, strict=True)
     )
     flipped = normals * rng.choice([-1, 1], (len(normals), 1)).astype(np.float32)
@@ -91,13 +34,8 @@ def test_what_is_inside_is_left_out_and_normals_point_outward():
 def test_pictures_show_the_side_they_are_taken_from():
     # A red half to the front (+x) and a green half to the left of the front camera's right (+y).
     rng = np.random.default_rng(0)
-    points, _, colours = sample(
-        ellipsoid(
-            (0, 0, 0), 0.5, lambda u, v, p: np.stack([p[..., 0] > 0, p[..., 1] > 0, 0 * u], -1)
-        ),
-        60000,
-        rng,
-    )
+    points, _ = sphere(0.5, 60000, rng)
+    colours = np.stack([points[:, 0] > 0, points[:, 1] > 0, 0 * points[:, 2]], -1)
     even = splat.even_subset(points, 4096, rng)
     front, back = pictures(points[even], np.rint(255 * colours[even]), (0.0, np.pi), (0.0, 0.0))
     assert front.shape == (64, 64, 4)
@@ -131,14 +69,44 @@ def test_view_features_know_what_is_unknown():
 
 
 def test_prepared_objects_have_the_promised_form():
-    mesh, _ = build("mushroom", 0)
-    once, again = (prepare(*sample(mesh, 8000, np.random.default_rng(1)), 7) for _ in range(2))
-    assert once.points.shape == once.colours.shape == (4096, 3)
+    (once, captions), (again, same) = (prepared("mushroom", 0, 4) for _ in range(2))
+    assert once.points.shape == once.colours.shape == once.normals.shape == (4096, 3)
     assert once.points.dtype == np.float16 and once.colours.dtype == np.uint8
-    assert np.abs(once.points).max() <= 0.5 + 1e-3
-    assert once.images.shape == (16, 64, 64, 4) and once.images.dtype == np.uint8
+    length = np.linalg.norm(once.normals.astype(float) / 127, axis=1)
+    np.testing.assert_allclose(length, 1, atol=0.01)
+    assert np.abs(once.points).max() <= 0.52
+    assert once.images.shape == (4, 64, 64, 4) and once.images.dtype == np.uint8
     assert (once.images[..., 3].mean((1, 2)) > 10).all()
     low, high = views.ELEVATIONS
     assert (once.elevation >= low - 1e-6).all() and (once.elevation <= high + 1e-6).all()
+    assert captions == same and len(captions) > 1
     for first, second in zip(once, again, strict=True):
         np.testing.assert_array_equal(first, second)
+
+
+def test_fresh_clouds_are_lit_new_and_repeatable():
+    kinds = [kind_of(name) for name in ("parametric-t-shirt-003", "parametric-fir_tree-011")]
+    assert kinds == ["t-shirt", "fir tree"]
+    assert kind_of("furniture-chairs-one") is None and kind_of("emoji-1f34e") is None
+    points, colours, said = fresh_clouds(kinds, 256, np.random.default_rng(1))
+    assert points.shape == colours.shape == (2, 256, 3)
+    assert points.dtype == np.float16 and colours.dtype == np.uint8 and len(said) == 2
+    again = fresh_clouds(kinds, 256, np.random.default_rng(1))
+    other = fresh_clouds(kinds, 256, np.random.default_rng(2))
+    np.testing.assert_array_equal(points, again[0])
+    assert not np.array_equal(points, other[0])
+
+
+def test_kinds_are_drawn_alike_however_many_variants_there_are():
+    principal = PRINCIPAL[0].replace(" ", "_")
+    names = [f"parametric-mug-{k:03d}" for k in range(8)] + ["parametric-car-000"]
+    names += [f"parametric-{principal}-000", "furniture-a-b", "furniture-a-c", "emoji-1f34e"]
+    fields = dict.fromkeys(records.Records.__dataclass_fields__)
+    held_out = np.arange(len(names)) == 0
+    weight = records.Records(**fields | {"name": np.array(names), "held_out": held_out}).weights()
+    assert weight[0] == 0
+    np.testing.assert_allclose(weight[1:8].sum(), weight[8])
+    np.testing.assert_allclose(weight[9], records.PRINCIPAL_WEIGHT * weight[8])
+    np.testing.assert_allclose(weight[:10].sum(), records.SHARES["parametric"])
+    np.testing.assert_allclose(weight[10:12].sum(), records.SHARES["furniture"])
+    np.testing.assert_allclose(weight[10], weight[11])

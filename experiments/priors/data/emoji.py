@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from experiments.priors.data.colour_names import colour_captions
 from experiments.priors.data.pictures import straight
 from experiments.priors.data.prepare import Prepared, save
 from experiments.priors.models.palette import article
@@ -68,6 +69,8 @@ def main() -> None:
         tags = [tag for tag in entry.get("tags", []) if tag.lower() not in label]
         captions += [f"{article(label)}, {', '.join(tags[:3])}"] if tags else []
         image = frame(Image.open(pictures[code]).convert("RGBA"))[None]
+        opaque = image[image[..., 3] > 200][:, :3] / 255
+        captions += colour_captions(label, False, opaque)
         view = np.zeros(1, np.float32)
         none = [np.zeros((0, 3), dtype) for dtype in (np.float16, np.int8, np.uint8)]
         record = Prepared(*none, image, view, view)

@@ -21,8 +21,9 @@ import numpy as np
 from tqdm import tqdm
 
 from experiments.priors.data import wavefront
+from experiments.priors.data.colour_names import colour_captions
 from experiments.priors.data.prepare import SAMPLES, prepare, save, stable_hash
-from experiments.priors.models.palette import COLOURS, article
+from experiments.priors.models.palette import article
 
 NOT_A_NAME = {"blend swap", "scopia", "kator legaz", "reallusion", ""}
 # Words in a model's own licence note that go beyond attribution.
@@ -108,27 +109,13 @@ def catalogue(path: Path) -> list[Entry]:
     return entries
 
 
-def dominant_colour(colours: np.ndarray) -> str | None:
-    """The name of the colour that covers most of the samples (N, 3), if one covers near half of
-    them.
-    """
-    names = list(COLOURS)
-    table = np.array([COLOURS[name] for name in names])
-    nearest = np.argmin(((colours[:, None] - table) ** 2).sum(-1), 1)
-    counts = np.bincount(nearest, minlength=len(names))
-    best = int(np.argmax(counts))
-    return names[best] if counts[best] > 0.45 * len(colours) else None
-
-
 def captions(entry: Entry, colours: np.ndarray) -> list[str]:
-    """The name, with its tags, and with the dominant colour if there is one."""
+    """The name, with its tags, and with the colours that are seen."""
     name = re.sub(r"\s*\(.*?\)", "", entry.name).strip().lower()
     plural = name.endswith("s") and not name.endswith("ss")
     found = [name if plural else article(name)]
     found += [f"{found[0]}, {tag}" for tag in entry.tags if tag not in name][:2]
-    colour = dominant_colour(colours[:: len(colours) // 2000])
-    if colour is not None:
-        found.append(f"{colour} {name}" if plural else article(f"{colour} {name}"))
+    found += colour_captions(name, plural, colours[:: max(1, len(colours) // 2000)])
     return list(dict.fromkeys(found))
 
 

@@ -26,7 +26,8 @@ FINISHES = (
     "complete object, clear shape", "fine surface detail", "smooth surface", "soft edges", "glossy",
     "natural colours", "simple shapes", "clean lines", "matte finish", "high detail",
 )  # fmt: skip
-SAID_WHOLE, SAID_PART, SAID_EXTRA = 0.35, 0.2, 0.6  # chances to say what goes without saying
+QUIET = 0.45  # chance that a caption says nothing that goes without saying, else
+SAID_WHOLE, SAID_PART, SAID_EXTRA = 0.35, 0.2, 0.7  # chances to say a colour, another, an extra
 IRREGULAR = {"leaves": "leaf", "berries": "berry", "branches": "branch", "shelves": "shelf"}
 IRREGULAR |= {"cherries": "cherry", "patties": "patty", "candies": "candy", "arches": "arch"}
 
@@ -60,23 +61,28 @@ class Said:
         self.adjectives: list[str] = []
         self.parts: dict[str, list[str]] = {}  # name as said -> adjectives, or a count alone
         self.colour = ""
+        quiet = rng.random() < QUIET
+
+        def worth(chance: float) -> bool:
+            return not quiet and rng.random() < chance
+
         for name, option in kind.options.items():
             word = choice.words[name]
-            if option.type == "form" and word and ("" in option.values or rng.random() < 0.6):
+            if option.type == "form" and word and ("" in option.values or worth(SAID_EXTRA)):
                 self.adjectives.append(word)
             elif option.type == "size" and word:
                 self.parts[name.replace("_", " ")] = [word]
-            elif option.type == "extra" and word and rng.random() < SAID_EXTRA:
+            elif option.type == "extra" and word and worth(SAID_EXTRA):
                 self.parts.setdefault(name.replace("_", " "), [])
-            elif option.type == "count" and rng.random() < SAID_EXTRA:
+            elif option.type == "count" and worth(SAID_EXTRA):
                 self.parts[name.replace("_", " ")] = [word]
         for part, colour in choice.colours.items():
             if part not in present:
                 continue
             said = part in choice.unusual
             if part == kind.main:
-                self.colour = colour if said or rng.random() < SAID_WHOLE else ""
-            elif said or (part not in kind.fixed and rng.random() < SAID_PART):
+                self.colour = colour if said or worth(SAID_WHOLE) else ""
+            elif said or (part not in kind.fixed and worth(SAID_PART)):
                 self.parts.setdefault(called(kind, choice, part), []).append(colour)
 
     def phrases(self, articles: bool) -> list[str]:
