@@ -16,7 +16,7 @@ from flax import nnx
 
 from experiments.priors.data.pictures import pictures
 from experiments.priors.data.prepare import POINTS, lit_points, random_views
-from experiments.priors.models import build
+from experiments.priors.models import usual
 from experiments.scorer.model import WEIGHTS, Scorer, embed, load
 from experiments.scorer.ranking import report, similarities, table
 from experiments.scorer.sentences import MODEL_NAMES, SENTENCES
@@ -63,7 +63,7 @@ def rendered_pictures(seeds: list[int], views: int = 8) -> np.ndarray:
         row = []
         for seed in seeds:
             rng = np.random.default_rng(seed)
-            surface = build(MODEL_NAMES[prompt], seed).model.sample(POINTS + POINTS // 2, rng)
+            surface = usual(MODEL_NAMES[prompt], seed).model.sample(POINTS + POINTS // 2, rng)
             points, _, colours = lit_points(surface.points, surface.normals, surface.colours, rng)
             row.append(pictures(points, colours, *random_views(rng, views)))
         rows.append(np.concatenate(row))

@@ -15,7 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from experiments.priors.data.splat import camera_frame, pinholes
-from experiments.priors.models import KINDS, PRINCIPAL, build, captions
+from experiments.priors.models import KINDS, PRINCIPAL, build, captions, usual
 from jaxphys.core.files import atomic_path, write_json
 
 RESOLUTION, SUPERSAMPLING = 64, 2
@@ -128,10 +128,12 @@ def mend(image: np.ndarray, depth: np.ndarray) -> None:
     image[rows, columns] = (around * weight).sum(0) / weight.sum(0)
 
 
-def shots_of(name: str, seed: int) -> tuple[np.ndarray, list[str]]:
-    """Pictures (8, 64, 64, 4) uint8 of one variant from around, and its captions."""
+def shots_of(name: str, seed: int, plain: bool = False) -> tuple[np.ndarray, list[str]]:
+    """Pictures (8, 64, 64, 4) uint8 of one variant from around, and its captions; a `plain` one
+    has its usual colours, as whoever names none means.
+    """
     rng = np.random.default_rng([seed, *name.encode()])
-    built = build(name, seed)
+    built = usual(name, seed) if plain else build(name, seed)
     points, colours, normals = (
         values.astype(np.float32) for values in built.model.sample(SAMPLES, rng)
     )
@@ -155,7 +157,7 @@ def main() -> None:
     for part in SEEDS:
         images, items = [], []
         for name, seed in tqdm(objects(part), desc=part):
-            drawn, said = shots_of(name, seed)
+            drawn, said = shots_of(name, seed, plain=part == "held_out")
             images.append(drawn)
             items.append({"name": name, "seed": seed, "captions": said})
         with atomic_path(folder / f"{part}.npz") as aside:

@@ -8,19 +8,19 @@ from experiments.priors.data.parametric import prepared
 from experiments.priors.data.pictures import pictures
 from experiments.priors.fresh import fresh_clouds, kind_of
 from experiments.priors.models import PRINCIPAL
+from experiments.priors.models.palette import golden_directions
 from jaxphys.guidance import views
 
 
-def sphere(radius, count, rng):
+def sphere(radius, count):
     """Points and normals (count, 3) of a sphere about the origin."""
-    unit = rng.normal(size=(count, 3))
-    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    unit = golden_directions(count)
     return radius * unit, unit
 
 
 def test_what_is_inside_is_left_out_and_normals_point_outward():
     rng = np.random.default_rng(0)
-    outer, inner = sphere(0.5, 60000, rng), sphere(0.3, 15000, rng)
+    outer, inner = sphere(0.5, 60000), sphere(0.3, 15000)
     points, normals = (
         np.concatenate(pair).astype(np.float32) for pair in zip(outer, inner, strict=True)
     )
@@ -34,7 +34,7 @@ def test_what_is_inside_is_left_out_and_normals_point_outward():
 def test_pictures_show_the_side_they_are_taken_from():
     # A red half to the front (+x) and a green half to the left of the front camera's right (+y).
     rng = np.random.default_rng(0)
-    points, _ = sphere(0.5, 60000, rng)
+    points, _ = sphere(0.5, 60000)
     colours = np.stack([points[:, 0] > 0, points[:, 1] > 0, 0 * points[:, 2]], -1)
     even = splat.even_subset(points, 4096, rng)
     front, back = pictures(points[even], np.rint(255 * colours[even]), (0.0, np.pi), (0.0, 0.0))

@@ -216,7 +216,10 @@ shipped = pytest.mark.skipif(not model.WEIGHTS.exists(), reason="the weights are
 def unseen() -> np.ndarray:
     """(12, 4, 64, 64, 3): one new object of each prompt."""
     return np.stack(
-        [on_ground(renders.shots_of(name, SEED)[0][::2]) for name in MODEL_NAMES.values()]
+        [
+            on_ground(renders.shots_of(name, SEED, plain=True)[0][::2])
+            for name in MODEL_NAMES.values()
+        ]
     )
 
 

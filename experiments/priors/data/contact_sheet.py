@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from experiments.priors.models import KINDS, Built, build
+from experiments.priors.models import KINDS, build, usual
 from experiments.priors.models.model import Surface
 
 SIDE, ACROSS, POINTS = 128, 6, 14_000
@@ -44,17 +44,6 @@ def picture(surface: Surface, azimuth: float, elevation: float, side: int = SIDE
     covered = nearest >= 0
     image[covered] = lit[order][nearest[covered]]
     return image
-
-
-def usual(name: str, seed: int) -> Built:
-    """A variant without unusual colours."""
-    kind = KINDS[name]
-    first = {part: colours[0] for part, colours in kind.colours.items() if part not in kind.same}
-    built = build(name, seed)
-    while built.choice.unusual & set(kind.same):
-        seed += 1000
-        built = build(name, seed)
-    return build(name, seed, first)
 
 
 def cell(name: str) -> Image.Image:

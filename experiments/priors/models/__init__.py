@@ -17,7 +17,7 @@ from experiments.priors.models.solids import Parts, listed
 from experiments.priors.models.variation import Choice, choose, options_of, paints
 from experiments.priors.models.words import caption
 
-__all__ = ["KINDS", "PRINCIPAL", "Built", "Kind", "Sample", "build", "captions", "sample"]
+__all__ = ["KINDS", "PRINCIPAL", "Built", "Kind", "Sample", "build", "captions", "sample", "usual"]
 
 # The objects a user is most likely to ask for first: they are drawn more often than the others.
 PRINCIPAL = (
@@ -72,6 +72,16 @@ def build(name: str, seed: int, given: Mapping[str, str] | None = None) -> Built
     """One variant of the kind `name`, the same for the same seed; `given` fixes colours by part and
     words by option, as {"spout": "long", "lid": "red"}."""
     return make(KINDS[name], np.random.default_rng([zlib.crc32(name.encode()), seed]), given)
+
+
+def usual(name: str, seed: int) -> Built:
+    """One variant with the colours that the kind usually has, as captions without colours mean."""
+    kind = KINDS[name]
+    given = {part: kind.colours[part][0] for part in kind.colours if part not in kind.same}
+    for number in range(seed, seed + 1_000_000, 10_000):
+        if not build(name, number).choice.unusual & set(kind.same):
+            return build(name, number, given)
+    raise AssertionError(f"no variant of {name} with its usual colours")
 
 
 def captions(built: Built, count: int, rng: np.random.Generator) -> list[str]:
