@@ -7,9 +7,8 @@ import pytest
 from flax import nnx
 
 from experiments.priors.data.pictures import pictures
-from experiments.priors.data.prepare import surface_points
-from experiments.priors.models import PRINCIPAL, build
-from experiments.priors.models.surfaces import sample
+from experiments.priors.data.prepare import lit_points
+from experiments.priors.models import PRINCIPAL, usual
 from jaxphys import weights
 from jaxphys.guidance.bundled.pixel_prior import PixelCondition
 from jaxphys.guidance.bundled.point_prior import PointCondition, to_frame
@@ -28,8 +27,9 @@ def objects():
     clouds = []
     for name in PRINCIPAL:
         rng = np.random.default_rng(UNSEEN)
-        clouds.append(surface_points(*sample(build(name, UNSEEN)[0], 20_000, rng), rng))
-    points, colours = (np.stack(part) for part in zip(*clouds, strict=True))
+        surface = usual(name, UNSEEN).model.sample(6_000, rng)
+        clouds.append(lit_points(surface.points, surface.normals, surface.colours, rng))
+    points, _, colours = (np.stack(part) for part in zip(*clouds, strict=True))
     return points, colours, jnp.asarray(load_text_encoder()([f"a {name}" for name in PRINCIPAL]))
 
 
