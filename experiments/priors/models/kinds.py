@@ -85,7 +85,10 @@ def number(text: str) -> float | int | str:
     return text
 
 
-COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+COUNTS = (
+    "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven",
+    "twelve",
+)  # fmt: skip
 
 
 def read_values(name: str, kind: str, text: str) -> dict:
@@ -95,7 +98,7 @@ def read_values(name: str, kind: str, text: str) -> dict:
         words, _, last = entry.strip().rpartition(" ")
         value = number(last)
         if kind == "count":
-            values[COUNTS[int(value)]] = int(value)
+            values[COUNTS[value]] = value
         elif isinstance(value, str):  # a word alone stands for itself; the first is the default
             word = entry.strip().removeprefix("*")
             values["" if entry.startswith("*") or (index == 0 and word == "plain") else word] = word

@@ -107,11 +107,6 @@ def also(*wheres):
     return lambda u, v, p: np.all([np.asarray(w(u, v, p), float) > 0.5 for w in wheres], 0)
 
 
-def facing(axis: str, sign: int, level: float):
-    """On the side past `level` in the direction `sign`."""
-    return lambda u, v, p: sign * p[:, AXIS[axis]] > level
-
-
 def mottled(wave, depth: float = 0.08):
     """Lighter and darker by a smooth random function of points, for `shade`."""
     return lambda u, v, p: 1 + depth * wave(p)

@@ -24,7 +24,7 @@ ENDS_IN_S = {
 }  # fmt: skip
 FINISHES = (
     "complete object, clear shape", "fine surface detail", "smooth surface", "soft edges", "glossy",
-    "natural colours", "simple shapes", "clean lines", "matte finish", "high detail",
+    "simple shapes", "clean lines", "matte finish", "high detail",
 )  # fmt: skip
 QUIET = 0.45  # chance that a caption says nothing that goes without saying, else
 SAID_WHOLE, SAID_PART, SAID_EXTRA = 0.35, 0.2, 0.7  # chances to say a colour, another, an extra

@@ -79,11 +79,10 @@ def barn(o, rng):
 
 @kind("castle", "buildings", also=("fortress", "fairytale castle"),
     colours=dict(walls="stone|light grey|grey|beige", roofs="blue|red|purple", gate="brown|wooden",
-        flags="red|yellow|blue", windows="!dark grey"), counts=dict(towers="2|4"),
-    sizes=dict(towers="short 0.8|1|tall 1.35"))
+        flags="red|yellow|blue", windows="!dark grey"), counts=dict(towers="2|3|4"))
 def castle(o, rng):
     h = 0.55 * rng.uniform(0.9, 1.1)
-    places = [(0.3, 0.34), (0.3, -0.34), (-0.3, 0.34), (-0.3, -0.34)][: max(2, int(o.towers))]
+    places = [(0.3, 0.34), (0.3, -0.34), (-0.3, 0.34), (-0.3, -0.34)][: o.towers]
     spots = [(x, y, 0) for x, y in places]
     body = [block(0.56, 0.62, 0.34).at(z=0.17), block(0.3, 0.34, 0.62).at(-0.05, 0, 0.31)]
     tower = [cylinder(0.13, h).copies(spots),

@@ -12,7 +12,6 @@ from experiments.priors.models.shapes import (
     petal,
     plate,
     refined,
-    speck,
     spray,
     tube,
 )
@@ -37,12 +36,6 @@ def pairs(xs, y: float, z: float) -> list[tuple[float, float, float]]:
 def eyes(x: float, y: float, z: float, radius: float) -> Solid:
     """A pair of eyes looking forward."""
     return ball(radius, fine=4).at(x, y, z).both()
-
-
-def googly(x: float, y: float, z: float, radius: float) -> Parts:
-    """A pair of white eyes with black pupils."""
-    pupil = ball(0.55 * radius, fine=4).at(x + 0.6 * radius, y, z)
-    return dict(eyes=eyes(x, y, z, radius), pupils=pupil.both())
 
 
 def beast(length=0.9, girth=0.22, legs=0.4, leg=0.07, neck=0.25, lift=45.0, head=0.16, snout=0.14,
@@ -135,11 +128,6 @@ def foliage(length: float, width: float, angles, rises, place=(0, 0, 0), droop=0
     one = leaf(length, width, droop).shade(lambda u, v,
         p: 1.12 - 0.4 * np.minimum(np.abs(p[:, 1]) / width * 2, 0.6))
     return spray(one, angles, rises, place=place, sizes=sizes)
-
-
-def seeds(places, up, size: float, long: float = 1.0) -> Solid:
-    """Specks standing on a surface at `places` (K, 3) with normals `up` (K, 3)."""
-    return speck(size, size * long, 0.6 * size).copies(places, up)
 
 
 def stalk(z: float, length: float = 0.16, radius: float = 0.02, lean: float = 0.05) -> Solid:

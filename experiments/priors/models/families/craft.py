@@ -182,13 +182,10 @@ def pirate_ship(o, rng):
     colours=dict(hull="wooden|red|blue|green", inside="light brown|beige", oars="beige|wooden"),
     extras=dict(oars=0.8))
 def rowing_boat(o, rng):
-    rim = hull([(-0.5, 0.12, 0.0, 0.26), (-0.25, 0.2, -0.06, 0.24), (0.2, 0.18, -0.06, 0.24),
-            (0.52, 0.015, 0.12, 0.3)], square=2.4)
     outer = sheet(lambda u, v: np.stack([v - 0.5 + 0 * u,
                 (0.02 + 0.22 * np.sin(np.pi * np.clip(0.22 + 0.78 * v, 0, 1)) ** 0.8)
                 * np.cos(np.pi * u), 0.24 + 0.08 * (v - 0.4) ** 2 * 2
                 - (0.24 - 0.1 * np.abs(v - 0.4)) * np.sin(np.pi * u) ** 0.7], -1), 0.045, (16, 14))
-    del rim
     seats = block(0.1, 0.36, 0.03).copies([(-0.22, 0, 0.17), (0.08, 0, 0.17)])
     oars = [rod((0.0, 0.1, 0.28), (-0.06, 0.62, 0.06), 0.016),
         ball(0.05, 0.13, 0.012).turn("x", -22).at(-0.07, 0.68, 0.03)]
@@ -218,7 +215,7 @@ def submarine(o, rng):
 
 @kind("flying saucer", "vehicles", also=("ufo", "alien spaceship"),
     colours=dict(body="silver|grey|purple", dome="light blue|light green",
-        lights="yellow|red|green", alien="green"), extras=dict(alien=0.0))
+        lights="yellow|red|green"))
 def flying_saucer(o, rng):
     k = 2 * np.pi * np.arange(10) / 10
     return dict(body=lathe([(0, -0.1), (0.2, -0.09), (0.5, 0.0), (0.46, 0.03), (0.2, 0.1),

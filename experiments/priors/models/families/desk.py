@@ -114,7 +114,7 @@ def padlock(o, rng):
 
 @kind("suitcase", "household", also=("travel suitcase", "luggage"),
     colours=dict(case="brown|leather|red|blue|turquoise", straps="dark brown|beige",
-        handle="=straps", locks="golden|silver", stickers="yellow|white"))
+        handle="=straps", locks="golden|silver"))
 def suitcase(o, rng):
     return dict(case=block(0.32, 0.96, 0.64, 0.05).at(z=0.32).coat("black", lambda u, v,
             p: np.abs(p[:, 0]) < 0.007), straps=[block(0.34, 0.08, 0.66, 0.02).at(0, 0.26,
@@ -135,12 +135,10 @@ def gift(o, rng):
     elif o.style == "dotted":
         body = body.coat("pattern", lambda u, v,
             p: (np.hypot((p[:, 0] * 7 + p[:, 1] * 7) % 1 - 0.5, (p[:, 2] * 7) % 1 - 0.5) < 0.24))
-    loop = ring(0.11, 0.04, 1.0).scale(1, 1, 1.6).turn("x", 90).scale(1.0, 1, 0.75).at(0, 0, 0)
     bow = [tube([(0, 0, 0), (0, 0.12, 0.2), (0, 0.3, 0.2), (0, 0.28, 0.06), (0, 0, 0)], 0.055,
             flat=0.5).at(z=h + 0.03).both(), tube([(0, 0, 0), (0.12, 0, 0.2), (0.3, 0, 0.18),
                 (0.27, 0, 0.05), (0, 0, 0)], 0.055, flat=0.5).at(z=h + 0.03).both("x"),
         ball(0.07).at(z=h + 0.06)]
-    del loop
     return dict(box=[body, block(0.74, 0.74, 0.15).at(z=h - 0.06)],
         ribbon=[block(0.12, 0.76, h + 0.04).at(z=0.5 * h),
             block(0.76, 0.12, h + 0.04).at(z=0.5 * h), *bow])

@@ -231,7 +231,7 @@ def headphones(o, rng):
     colours=dict(blades="light blue|white|blue|silver", cage="silver|white|black",
         stand="white|black|blue"), counts=dict(blades="3|4|5"))
 def fan(o, rng):
-    n = int(o.blades)
+    n = o.blades
     blade = ball(0.02, 0.11, 0.15).turn("z", 22).at(0, 0.03, 0.19)
     cage = [ring(0.37, 0.016).turn("y", 90).at(x) for x in (-0.06, 0.08)] + [ring(0.2,
             0.008).turn("y", 90).at(0.1)]

@@ -214,10 +214,8 @@ def grapes(o, rng):
 def avocado(o, rng):
     outline = rounded([(0.0, -0.45), (0.3, -0.33), (0.34, -0.08), (0.2, 0.25), (0.1, 0.48),
             (-0.1, 0.48), (-0.2, 0.25), (-0.34, -0.08), (-0.3, -0.33)])
-    body = plate(outline, 0.4, puff=0.9).coat("skin", lambda u, v, p: p[:, 2] < 0.01)
     cut = plate(0.93 * outline, 0.06).at(0.0)
     half = plate(outline, 0.5, puff=0.9)
-    del body
     return dict(skin=half.scale(0.6, 1, 1).at(-0.13),
         flesh=cut.at(0.03).coat("yellow", lambda u, v,
             p: 0.6 * (np.hypot(p[:, 0], p[:, 1] + 0.12) < 0.24)),

@@ -56,9 +56,9 @@ def chair(o, rng):
 
 @kind("stool", "furniture", also=("bar stool", "round stool"),
     colours=dict(seat="wooden|red|black|brown", legs="wooden|silver|black"),
-    sizes=dict(legs="short 0.6|1|long 1.4"), counts=dict(legs="3|4"))
+    counts=dict(legs="3|4"), forms=dict(height="low 0.65|1|tall 1.35"))
 def stool(o, rng):
-    n, z = 4, 0.7 * rng.uniform(0.85, 1.1)
+    n, z = o.legs, 0.7 * o.height
     return dict(seat=cylinder(0.24, 0.07, bevel=0.02).at(z=z),
         legs=[rod((0.24, 0, 0), (0.14, 0, z), 0.024, 0.03).turn("z", 45).around(n),
             ring(0.2, 0.014).at(z=0.32 * z)])

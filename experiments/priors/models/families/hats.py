@@ -104,7 +104,7 @@ def beanie(o, rng):
     colours=dict(crown="golden|silver", jewels="red|blue|green", velvet="red|purple"),
     counts=dict(points="5|6|8"), extras=dict(velvet=0.4))
 def crown_(o, rng):
-    n = int(o.points)
+    n = o.points
     a = 2 * np.pi * np.arange(n) / n
     tips = np.stack([0.43 * np.cos(a), 0.43 * np.sin(a), 0 * a + 0.46], -1)
 

@@ -90,7 +90,7 @@ def candle(o, rng):
 
 
 @kind("sponge", "household", also=("kitchen sponge", "cleaning sponge"),
-    colours=dict(sponge="yellow|orange|pink", pad="green|blue", holes="!golden"),
+    colours=dict(sponge="yellow|orange|pink", pad="green|blue"),
     extras=dict(pad=0.55))
 def sponge(o, rng):
     body = block(0.62, 1.0, 0.36, 0.06)
@@ -133,7 +133,7 @@ def umbrella(o, rng):
 
 
 @kind("toothbrush", "household", colours=dict(handle="blue|red|green|pink|orange",
-        bristles="white", tips="=handle"), forms=dict(style="plain|two-coloured"))
+        bristles="white", tips="=handle"))
 def toothbrush(o, rng):
     y = [-0.028, 0, 0.028]
     tuft = cylinder(0.013, 0.11)
@@ -237,8 +237,7 @@ def vase(o, rng):
 
 
 @kind("trash can", "household", also=("rubbish bin", "garbage can", "dustbin"),
-    colours=dict(can="silver|green|grey|blue|black", lid="=can", handle="=can"),
-    extras=dict(open=0.0))
+    colours=dict(can="silver|green|grey|blue|black", lid="=can", handle="=can"))
 def trash_can(o, rng):
     rib = lambda u, v, p: 0.86 + 0.14 * np.cos(2 * np.pi * 24 * u)
     return dict(can=[cylinder(0.3, 0.75, 0.36).shade(rib),

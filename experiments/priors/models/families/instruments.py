@@ -170,7 +170,7 @@ def saxophone(o, rng):
     colours=dict(tube="wooden|beige|silver|brown|golden", rings="white|golden|black",
         holes="!black"), counts=dict(holes="5|6|7"))
 def flute(o, rng):
-    z = np.linspace(-0.3, 0.16, int(o.holes))
+    z = np.linspace(-0.3, 0.16, o.holes)
     body = lathe([(0, -0.5), (0.06, -0.5), (0.065, -0.46), (0.045, -0.4), (0.05, 0.24),
             (0.06, 0.28), (0.06, 0.4), (0.03, 0.5), (0, 0.5)], sharp=True)
     return each(dict(tube=body, rings=ring(0.052, 0.016).copies([(0, 0, 0.26), (0, 0, -0.38)]),
@@ -182,10 +182,7 @@ def flute(o, rng):
     colours=dict(bell="golden|silver|copper", handle="wooden|black|golden", clapper="!dark grey",
         ribbon="red|blue"), extras=dict(ribbon=0.3))
 def bell(o, rng):
-    body = lathe([(0, -0.05), (0.2, -0.05), (0.37, -0.4), (0.43, -0.46), (0.4, -0.47),
-            (0.33, -0.4), (0.2, -0.1), (0, -0.1)][::-1])
     dome = lathe([(0.43, -0.46), (0.37, -0.36), (0.28, -0.05), (0.22, 0.1), (0.1, 0.18), (0, 0.19)])
-    del body
     return dict(bell=[dome, ring(0.41, 0.03).at(z=-0.44)],
         handle=lathe([(0, 0.17), (0.04, 0.17), (0.06, 0.32), (0.04, 0.42), (0.065, 0.5),
                 (0, 0.54)]), clapper=ball(0.08).at(z=-0.47),
@@ -233,10 +230,10 @@ def maracas(o, rng):
 
 
 @kind("xylophone", "instruments", also=("glockenspiel",),
-    colours=dict(frame="wooden|white|brown", mallets="red|wooden|blue", bars="!red"),
+    colours=dict(frame="wooden|white|brown", mallets="red|wooden|blue"),
     counts=dict(bars="6|7|8"))
 def xylophone(o, rng):
-    n = int(o.bars)
+    n = o.bars
     names = ("red", "orange", "yellow", "light green", "green", "light blue", "blue", "purple")
     y = np.linspace(-0.43, 0.43, n)
     parts = dict(frame=[block(0.05, 1.0, 0.05).turn("z", s * -6).at(s * 0.16, 0,

@@ -185,7 +185,7 @@ def tea_cup(o, rng):
     colours=dict(fork="silver|golden|metal", handle="=fork"), counts=dict(prongs="3|4"),
     sizes=dict(handle="short 0.7|1|long 1.25"))
 def fork(o, rng):
-    n = int(o.prongs)
+    n = o.prongs
     h = 0.6 * o.handle
     y = np.linspace(-0.075, 0.075, n)
     prongs = [tube([(0.0, a * 0.9, 0.1), (0.035, a, 0.2), (0.02, a, 0.42)],
@@ -291,8 +291,7 @@ def blender(o, rng):
 
 
 @kind("salt shaker", "kitchen", also=("pepper shaker", "salt cellar"),
-    colours=dict(body="white|glass|red|light blue|wooden", top="silver|golden", holes="!black",
-        salt="white"))
+    colours=dict(body="white|glass|red|light blue|wooden", top="silver|golden", holes="!black"))
 def salt_shaker(o, rng):
     return dict(body=lathe([(0, 0), (0.22, 0), (0.2, 0.1), (0.15, 0.46), (0, 0.46)],
             waves=(8, 0.025)), top=lathe([(0, 0.44), (0.165, 0.44), (0.17, 0.52), (0.13, 0.6),
@@ -333,7 +332,7 @@ def stove(o, rng):
         window=block(0.02, 0.44, 0.26).at(0.3, 0, 0.42),
         handle=limb((0.33, -0.24, 0.63), (0.33, 0.24, 0.63), 0.022),
         knobs=cylinder(0.035, 0.05).turn("y", 90).copies([(0.29, y,
-                0.78) for y in np.linspace(-0.24, 0.24, int(o.knobs))]),
+                0.78) for y in np.linspace(-0.24, 0.24, o.knobs)]),
         plates=ring(0.085, 0.02).joined(ring(0.085,
                 0.02).scale(0.5)).copies([(x, y, 0.885) for x in (-0.13, 0.14) for y in (-0.16,
                 0.16)]), grey=block(0.02, 0.6, 0.012).at(0.3, 0, 0.16))

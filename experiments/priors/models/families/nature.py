@@ -57,9 +57,9 @@ def moon(o, rng):
 
 @kind("sun", "nature", also=("smiling sun",),
     colours=dict(sun="yellow|orange", rays="orange|yellow", face="!dark brown"),
-    counts=dict(rays="8|10"), extras=dict(face=0.6))
+    counts=dict(rays="8|10|12"), extras=dict(face=0.6))
 def sun(o, rng):
-    n = 10
+    n = o.rays
     ray = plate(refined([(0.09, -0.08), (0, 0.14), (-0.09, -0.08)], 4), 0.1, puff=0.6).at(z=0.42)
     face = [ball(0.02, 0.03, 0.045).at(0.3, 0.09, 0.09).both(),
         tube([(0.27, -0.13, -0.06), (0.29, 0, -0.12), (0.27, 0.13, -0.06)], 0.016)]
@@ -161,11 +161,10 @@ def campfire(o, rng):
                 0 * a + 0.04], -1), spin=a) if o.stones else [])
 
 
-@kind("snowflake", "nature", also=("ice crystal",), colours=dict(ice="light blue|white|silver"),
-    counts=dict(branches="6"))
+@kind("snowflake", "nature", also=("ice crystal",), colours=dict(ice="light blue|white|silver"))
 def snowflake(o, rng):
     k = rng.uniform(0.8, 1.2)
     arm = [rod((0, 0, 0), (0, 0, 0.5), 0.028, 0.02)] + [rod((0, 0, z), (0, s * w, z + 0.8 * w),
             0.02, 0.014) for z, w in ((0.18, 0.09), (0.3, 0.13 * k)) for s in (-1, 1)]
     return dict(ice=[*(s.around(6, "x") for s in arm),
-            plate(polygon(6, 0.09, None, np.pi / 2), 0.06)], branches=[])
+            plate(polygon(6, 0.09, None, np.pi / 2), 0.06)])

@@ -43,7 +43,7 @@ from experiments.priors.models.solids import Solid, each, together
     sizes=dict(stem="short 0.6|1|long 1.35"))
 def rose(o, rng):
     long = 0.85 * o.stem
-    head = each(bloom(rng, 0.3), lambda s: s.at(z=0.02))
+    head = each(bloom(rng, 0.42), lambda s: s.at(z=0.02))
     lean = rng.normal(0, 0.05, 2)
     angles = rng.uniform(0, 360) + 150 * np.arange(3)
     places = [(0, 0, -long * h) for h in (0.35, 0.55, 0.72)]
@@ -203,7 +203,7 @@ def fir(o, rng):
 
 @kind("christmas tree", "plants", also=("decorated fir tree",),
     colours=dict(needles="dark green|green", baubles="red|golden", star="golden|yellow",
-        trunk="brown", lights="yellow|white"), extras=dict(gifts=0.0))
+        trunk="brown", lights="yellow|white"))
 def christmas_tree(o, rng):
     tiers = [lathe([(0, 0.06), (w, 0), (0.03, 0.42), (0, 0.43)], sharp=True,
             waves=(11, 0.06)).at(z=z).shade(lambda u, v,

@@ -37,19 +37,17 @@ from experiments.priors.models.solids import each
 # ruff: noqa: E731
 
 
-def patches(count: int, radius: float):
-    """Round patches spread over a ball, a tenth of them dark: the twelve of a football."""
+def patches() -> np.ndarray:
+    """Directions (12, 3) of the dark patches of a football: the corners of an icosahedron."""
     phi = (1 + 5**0.5) / 2
     corners = np.array([(0, s, t * phi) for s in (-1, 1) for t in (-1, 1)])
-    corners = np.concatenate([np.roll(corners, k, 1) for k in range(3)]) / np.sqrt(1 + phi**2)
-    del count
-    return corners, radius
+    return np.concatenate([np.roll(corners, k, 1) for k in range(3)]) / np.sqrt(1 + phi**2)
 
 
 @kind("soccer ball", "sports", also=("football", "soccerball"),
     colours=dict(ball="white", patches="black|blue|red"))
 def soccer_ball(o, rng):
-    corners, _ = patches(12, 0.4)
+    corners = patches()
     dark = lambda u, v, p: (p @ corners.T).max(1) / 0.5 > np.cos(0.4)
 
     def seam(u, v, p):
@@ -244,7 +242,7 @@ def helmet(o, rng):
 
 
 @kind("chess pawn", "sports", also=("pawn", "chess piece"),
-    colours=dict(pawn="white|black|wooden|cream"), extras=dict(base=0.0))
+    colours=dict(pawn="white|black|wooden|cream"))
 def pawn(o, rng):
     return dict(pawn=[lathe([(0, -0.5), (0.27, -0.5), (0.27, -0.42), (0.2, -0.36), (0.12, -0.2),
                 (0.08, 0.06), (0.09, 0.12), (0, 0.12)]), ball(0.16).at(z=0.25),

@@ -176,12 +176,10 @@ def cake(o, rng):
         parts["layers"].append(cylinder(r, h).coat("filling",
                 between("z", 0.42 * h, 0.56 * h)).at(z=level))
         n, f = int(rng.integers(9, 13)), rng.uniform(0, 6)
-        drip = limb((0, 0, 0), (0, 0, 0.14 * h), 0.055)
         a = 2 * np.pi * np.arange(n) / n + f
         drops = [limb((r * np.cos(b), r * np.sin(b), level + h),
                 (r * np.cos(b), r * np.sin(b), level + h * rng.uniform(0.4, 0.75)),
                 0.045) for b in a]
-        del drip
         parts["icing"] += [cylinder(r + 0.025, 0.07, bevel=0.02).at(z=level + h - 0.045), *drops]
         level += h + 0.02
         last, r = r, r * 0.68

@@ -120,7 +120,7 @@ def shovel(o, rng):
     colours=dict(head="metal|green|red|dark grey", handle="wooden|brown"),
     counts=dict(teeth="6|7|8|9"))
 def rake(o, rng):
-    y = np.linspace(-0.22, 0.22, int(o.teeth))
+    y = np.linspace(-0.22, 0.22, o.teeth)
     teeth = [tube([(0, a, 0), (0.09, a, 0.01), (0.1, a, -0.1)], 0.012) for a in y]
     return dict(head=[block(0.04, 0.48, 0.04, 0.01), *teeth,
             rod((0, 0.02, 0), (0, 0, 0.12), 0.02)], handle=rod((0, 0, 0.05), (0, 0, 1.0), 0.022),
@@ -190,7 +190,7 @@ def paintbrush(o, rng):
 @kind("ladder", "tools", also=("step ladder",),
     colours=dict(rails="wooden|silver|yellow|red", rungs="=rails"), counts=dict(rungs="4|5|6|7|8"))
 def ladder(o, rng):
-    z = np.linspace(0.08, 0.95, int(o.rungs))
+    z = np.linspace(0.08, 0.95, o.rungs)
     return each(dict(rails=block(0.06, 0.045, 1.04).at(0, 0.2, 0.52).both(),
             rungs=rod((0, -0.2, 0), (0, 0.2, 0), 0.022).copies([(0, 0, a) for a in z])),
         lambda s: s.turn("y", -12))

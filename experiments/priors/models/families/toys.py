@@ -153,7 +153,7 @@ def kite(o, rng):
     quad = refined([(0.34, 0.12), (0, 0.5), (-0.34, 0.12), (0, -0.5)], 6)
     body = plate(quad, 0.03).coat("panels", lambda u, v,
         p: p[:, 0] * (p[:, 1] - 0.12) > 0).at(z=0.3)
-    z = np.linspace(-0.3, -0.9, int(o.bows))
+    z = np.linspace(-0.3, -0.9, o.bows)
     line = lambda a: np.array([0, 0.07 * np.sin(11 * a), a])
     path = [line(a) for a in np.linspace(-0.2, -0.95, 12)]
     bow = cone(0.055, 0.1).turn("x", -90).both()
@@ -216,7 +216,7 @@ def rocking_horse(o, rng):
     colours=dict(blades="red|blue|yellow|pink", stick="white|wooden", pin="golden|white",
         backs="white|yellow"), counts=dict(blades="4|6|8"))
 def pinwheel(o, rng):
-    n = int(o.blades)
+    n = o.blades
     w = 1.5 / n
     blade = sheet(lambda u, v: np.stack([0.13 * np.sin(np.pi * u) * v,
                 0.04 + 0.42 * v * (1 - 0.35 * u), w * v * u * 1.1], -1), 0.015)

@@ -130,12 +130,9 @@ def potato(o, rng):
     colours=dict(peas="light green|green", pod="green"))
 def peas(o, rng):
     y = np.linspace(-0.32, 0.32, 6)
-    half = lathe([(0.0, -0.5), (0.06, -0.4), (0.13, -0.15), (0.13, 0.15), (0.06, 0.4),
-            (0, 0.5)]).turn("x", 90)
     shell = [sheet(lambda u, v, s=s: np.stack([0.16 * np.sin(np.pi * v) * s
                 * np.sin(0.5 * np.pi * u) + 0 * u, v - 0.5,
                 -0.13 * np.sin(np.pi * v) * np.cos(0.5 * np.pi * u)], -1), 0.025) for s in (-1, 1)]
-    del half
     return dict(peas=ball(0.095).copies(np.stack([0 * y, y, 0.0 - 0.1 * y**2], -1),
             sizes=1 - 1.1 * np.abs(y) ** 1.5), pod=[*shell,
             tube([(0, 0.48, 0), (0, 0.58, 0.02), (0, 0.62, 0.06)], 0.02)])
