@@ -194,7 +194,7 @@ def elephant(o, rng):
 def giraffe(o, rng):
     parts, head = beast(0.7, 0.17, 0.62, 0.045, 0.85 * o.neck, 70, 0.09, 0.12, 0.6, paws=False,
         droop=25)
-    spots = near(rng.uniform((-0.4, -0.2, 0.55), (0.6, 0.2, 1.7), (110, 3)) * (1, 1, 1), 0.06)
+    spots = near(rng.uniform((-0.36, -0.2, 0.58), (0.4, 0.2, 0.95), (60, 3)), 0.06)
     neck = rng.uniform((-0.14, -0.14, 0), (0.14, 0.14, 1), (45, 3))
     body = [parts["body"][0].coat("spots", spots), parts["body"][1],
         parts["body"][2].coat("spots", near(neck, 0.055))]

@@ -281,7 +281,7 @@ def bush(o, rng):
     return parts
 
 
-@kind("four-leaf clover", "plants", also=("clover", "shamrock"),
+@kind("clover", "plants", also=("shamrock", "clover leaf"),
     colours=dict(leaves="green|light green|dark green", stem="=leaves"), counts=dict(leaves="3|4"))
 def clover(o, rng):
     t = np.linspace(0, 2 * np.pi, 48, endpoint=False)
