@@ -18,7 +18,6 @@ METAL = {"youngs_modulus": 1.0, "poisson_ratio": 0.3, "yield_stress": 0.05, "har
 SAND = {"youngs_modulus": 1.0, "poisson_ratio": 0.3, "friction_angle": 35.0}
 CASES = [(VON_MISES, METAL), (DRUCKER_PRAGER, SAND)]
 IDS = ["von Mises", "Drucker-Prager"]
-RANDOM = np.random.default_rng(4)
 KEPT = jnp.zeros((1, 30))  # history that the energy does not read
 
 
@@ -38,7 +37,8 @@ def principal(law, values, strains, kept=0.0):
 
 
 def samples(count=30, size=0.15):
-    return np.eye(3)[:, :, None] + size * RANDOM.normal(size=(3, 3, count))
+    random = np.random.default_rng(41)
+    return np.eye(3)[:, :, None] + size * random.normal(size=(3, 3, count))
 
 
 def pulled(plastic, values):
@@ -276,10 +276,11 @@ def test_frictionless_sand_bears_no_shear():
 
 @pytest.mark.parametrize(("law", "values"), CASES, ids=IDS)
 def test_gradients_against_central_differences(law, values):
+    random = np.random.default_rng(42)
     F, values = jnp.asarray(samples()), arrays(values)
     kept = jnp.full((1, 30), 0.02)
-    dF = RANDOM.normal(size=F.shape)
-    weights = [RANDOM.normal(size=shape) for shape in (F.shape, F.shape, kept.shape)]
+    dF = random.normal(size=F.shape)
+    weights = [random.normal(size=shape) for shape in (F.shape, F.shape, kept.shape)]
 
     @jax.jit
     def loss(F, values, kept):
