@@ -27,7 +27,10 @@ from jaxphys.mpm.grid import Grid
 from jaxphys.scene.scene import Object
 
 RELAX_STEPS = 40
+# Of drawn filling: standard deviation over spacing, its least part near the skin, and opacity.
 SIZE_OVER_SPACING = 0.4
+SMALLEST = 0.25
+OPACITY = 0.95
 # A splat of opacity 0.95 is fainter than 1/255 from so many of its standard deviations on.
 VISIBLE = 3.3
 # Splats farther apart than this many times the usual distance, and than a cell of the grid, do not
@@ -162,8 +165,11 @@ def _shown(points: np.ndarray, moving: Gaussians, thing: Object, grid: Grid) -> 
     depth = np.sqrt(np.maximum(distance**2 - gap**2, 0))
     colours = np.asarray(dc_to_rgb(moving.harmonics[:, 0]))[nearest]
     usual = SIZE_OVER_SPACING * _config(thing, grid).pitch
-    sizes = np.clip(depth / VISIBLE, 0.05 * usual, usual)
-    return from_points(points.astype(moving.means.dtype), colours, sizes)
+    fits = depth / VISIBLE
+    sizes = np.clip(fits, SMALLEST * usual, usual)
+    # What does not fit even so is faint: the renderer draws no splat smaller than a pixel.
+    opacity = OPACITY * np.minimum(fits / sizes, 1) ** 2
+    return from_points(points.astype(moving.means.dtype), colours, sizes, opacity=opacity)
 
 
 def _numbers(values) -> str:

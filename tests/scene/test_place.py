@@ -59,7 +59,7 @@ def test_the_solver_weighs_what_was_placed():
     scene = Scene(objects=(THING,), domain=Domain((2.4, 2.4, 2.4), SPACING), frame_time=0.01)
     g = cone()
     placed = put(THING, g)
-    model = build(scene, g, placed=(placed,)).model
+    model = build(scene, g, placed=(placed,)).simulation.model
     density = float(model.mass[0] / model.volume[0])
     assert float(jnp.sum(model.mass)) == pytest.approx(density * volume_of(placed), rel=0.01)
 
