@@ -178,6 +178,8 @@ def _facts(scene: Scene, built: Built) -> tuple[dict[str, str], dict[str, str]]:
         included["filling"] = "hollow objects get particles inside"
     else:
         left_out["filling"] = "every particle carries a Gaussian"
+    if any(built.look.lone):
+        left_out["lone splats"] = f"{sum(built.look.lone)} lie apart from their object"
     for name in sorted({thing.material for thing in scene.objects}):
         included[f"material {name}"] = MATERIALS[name].description
     return included, left_out

@@ -15,7 +15,7 @@ from jaxphys.scene.place import Placed
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=("gaussians", "still", "colours"),
-    meta_fields=("counts",),
+    meta_fields=("counts", "lone"),
 )
 @dataclass(frozen=True)
 class Look:
@@ -27,12 +27,14 @@ class Look:
         still: Gaussians that are drawn but do not move, or None.
         colours: the range of colours of each object, None where they are left as they are.
         counts: moving Gaussians of each object.
+        lone: Gaussians beside each object that were left out, since nothing would hold them to it.
     """
 
     gaussians: Gaussians
     still: Gaussians | None
     colours: tuple[ColourRange, ...] | None
     counts: tuple[int, ...]
+    lone: tuple[int, ...] = ()
 
     @property
     def objects(self) -> tuple[tuple[int, int], ...]:
@@ -50,4 +52,5 @@ def look_of(placed: tuple[Placed, ...], regularise_colours: bool) -> Look:
         still=concatenate(still) if still else None,
         colours=ranges if regularise_colours else None,
         counts=tuple(one.moving.count for one in placed),
+        lone=tuple(one.lone for one in placed),
     )

@@ -67,11 +67,12 @@ class Filling(Checked):
         search_count: how many of the six directions must hit for a cell to be inside.
         exclude_direction, ray_direction: 0 to 5 for +x, -x, +y, -y, +z, -z; -1 for none. The first
             is not searched; along the second, solid parts must be crossed an odd number of times.
-        per_cell: particles for every cell inside.
+        per_cell: particles for every cell's volume inside.
         maximum: largest number of particles to add.
         area: (x0, x1, y0, y1, z0, z1) in the domain [m]; null: everywhere.
         smooth: smooth the density field first.
-        relax: spread the new particles to blue noise; some 25 s for 30,000 on two cores.
+        relax: spread the new particles to blue noise; some 25 s for 30,000 on two cores, and only
+            where jax-md is installed (the extra `relax`).
         show: draw them too, each as a round Gaussian in the colour of the nearest one, for objects
             that come apart.
     """
