@@ -186,13 +186,11 @@ def _by_segment(config, model, function, *fields):
 
 
 def contact_bound(model, grid) -> Array:
-    """2 / sqrt(k/m) [s], (), for the stiffest contact k/m [1/s^2] of all boundaries that have a
-    method `stiffest(model, grid)`; infinite without one.
+    """2 / sqrt(k/m) [s], (), with the stiffest contacts k/m [1/s^2] of all boundaries together, for
+    several may touch at one place; infinite where none does.
     """
-    rates = [b.stiffest(model, grid) for b in model.boundaries if hasattr(b, "stiffest")]
-    if not rates:
-        return jnp.asarray(jnp.inf, model.mass.dtype)
-    return 2 / jnp.sqrt(jnp.max(jnp.stack(rates)))
+    rates = [boundary.stiffest(model, grid) for boundary in model.boundaries]
+    return 2 / jnp.sqrt(sum(rates, jnp.zeros((), model.mass.dtype)))
 
 
 def hard_limits(config, model, state) -> Array:
