@@ -16,9 +16,10 @@ HEIGHT = 2.0  # above the floor
 SPACING = 1 / 24
 SIZE = 0.9
 MIDDLE = SIDE / 2
-# The lowest wall is three cells deep and has no friction: it stays below the floor up to a spacing
-# of 0.13 m.
-FLOOR = 0.4
+# The walls are slippery, so the lowest one stays below the floor; a grid of 0.12 m still has two
+# cells outside it.
+FLOOR = 0.25
+INSET = 0.2
 
 
 def default_scene(material: str, *, spacing: float = SPACING) -> Scene:
@@ -39,7 +40,7 @@ def _scene(thing: Object, domain: Domain, friction: float, **fields) -> Scene:
     floor = Plane((MIDDLE, MIDDLE, FLOOR), (0.0, 0.0, 1.0), "separate", friction)
     return Scene(
         objects=(thing,),
-        boundaries=(floor, Walls()),
+        boundaries=(floor, Walls(inset=INSET)),
         domain=domain,
         ground=Ground(FLOOR),
         **fields,
