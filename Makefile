@@ -29,6 +29,7 @@ test-slow: $(VENV)/installed-test
 lint: $(VENV)/installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mypy
 
 bench: $(VENV)/installed-test
 	$(PIP) install --constraint constraints.txt --editable '.[bench]'

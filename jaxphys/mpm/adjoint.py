@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import jax
 
 from jaxphys.core.errors import InputError
-
-from .transfer import TRANSFERS
+from jaxphys.mpm.transfer import TRANSFERS
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.core.errors import InputError
-
-from .adjoint import Adjoint, Plain, lean, repeat
-from .state import (
+from jaxphys.mpm.adjoint import Adjoint, Plain, lean, repeat
+from jaxphys.mpm.state import (
     COLLAPSED,
     INVERTED,
     LEFT_GRID,
@@ -23,8 +22,8 @@ from .state import (
     State,
     Status,
 )
-from .step import step
-from .time_step import hard_limits
+from jaxphys.mpm.step import step
+from jaxphys.mpm.time_step import hard_limits
 
 PLAIN = Plain()
 

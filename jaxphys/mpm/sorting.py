@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .grid import Grid
+from jaxphys.mpm.grid import Grid
 
 
 def cell_order(position, grid: Grid, segments=None) -> np.ndarray:

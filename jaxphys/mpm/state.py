@@ -9,8 +9,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError
-
-from .grid import Grid
+from jaxphys.mpm.grid import Grid
 
 CODES = 8
 (

@@ -6,9 +6,8 @@ from jax import Array
 from jaxphys.core import algebra, compensated
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
-
-from .kernel import base_node, inside
-from .state import (
+from jaxphys.mpm.kernel import base_node, inside
+from jaxphys.mpm.state import (
     CODES,
     COLLAPSED,
     INVERTED,
@@ -23,7 +22,7 @@ from .state import (
     State,
     Status,
 )
-from .transfer import grid_to_particle, particle_to_grid, window_origin
+from jaxphys.mpm.transfer import grid_to_particle, particle_to_grid, window_origin
 
 COLLAPSE = 1e-3  # share of its volume below which a particle counts as collapsed
 

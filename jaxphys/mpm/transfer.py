@@ -23,7 +23,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.ad_checkpoint import checkpoint_name
 
-from .kernel import base_node, weights
+from jaxphys.mpm.kernel import base_node, weights
 
 Shape = tuple[int, int, int]
 TRANSFERS = "transfers"  # what `adjoint.lean` keeps

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array, lax
 
-from .projection import Projected
-from .settings import REFERENCE_TILE, Settings
-from .sorting import group_stably, stable_order
+from jaxphys.render.projection import Projected
+from jaxphys.render.settings import REFERENCE_TILE, Settings
+from jaxphys.render.sorting import group_stably, stable_order
 
 # Pairs are counted in int32; a picture that needs more than this is not drawn, and says so.
 MOST_PAIRS = 2**30

@@ -13,10 +13,10 @@ import jax
 import jax.numpy as jnp
 from jax import Array, lax
 
-from .binning import Boxes, Grid, TileLists
-from .blending_gradient import blend_backward
-from .settings import Settings
-from .tile_groups import (
+from jaxphys.render.binning import Boxes, Grid, TileLists
+from jaxphys.render.blending_gradient import blend_backward
+from jaxphys.render.settings import Settings
+from jaxphys.render.tile_groups import (
     any_alive,
     blending_weights,
     busy_groups,

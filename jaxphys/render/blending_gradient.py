@@ -14,8 +14,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array, lax
 
-from .binning import Boxes, Grid, slot_owners
-from .tile_groups import (
+from jaxphys.render.binning import Boxes, Grid, slot_owners
+from jaxphys.render.tile_groups import (
     Work,
     any_alive,
     blending_weights,

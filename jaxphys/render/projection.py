@@ -6,9 +6,8 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from jaxphys.core.splats import Splats
-
-from .camera import Camera
-from .settings import Settings
+from jaxphys.render.camera import Camera
+from jaxphys.render.settings import Settings
 
 # Means [m] and covariances [m^2] beyond this are drawn no more than infinite ones are: their
 # squares would leave float32 on the way to the picture.

@@ -10,12 +10,11 @@ from jax import Array, lax
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.splats import Splats
-
-from .binning import MOST_PAIRS, make_grid, tile_boxes, tile_lists
-from .blending import blend
-from .camera import Camera
-from .projection import project
-from .settings import Settings
+from jaxphys.render.binning import MOST_PAIRS, make_grid, tile_boxes, tile_lists
+from jaxphys.render.blending import blend
+from jaxphys.render.camera import Camera
+from jaxphys.render.projection import project
+from jaxphys.render.settings import Settings
 
 DEFAULT = Settings()
 

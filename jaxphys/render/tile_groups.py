@@ -10,8 +10,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from .binning import Grid, TileLists
-from .settings import Settings
+from jaxphys.render.binning import Grid, TileLists
+from jaxphys.render.settings import Settings
 
 # Elements of one chunk of a group, such that its few arrays stay in a core's cache.
 GROUP_ELEMENTS = 2**16

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from flax import nnx
+from jax import Array
 
 from experiments.parity.arrays import pseudo_random, weights
 from jaxphys.core.errors import InputError
@@ -69,7 +70,7 @@ def decode(decoder, latents):
     return decoder(latents)
 
 
-def run_encoder(encoder, dtype=jnp.float32) -> dict[str, jax.Array]:
+def run_encoder(encoder, dtype=jnp.float32) -> dict[str, Array]:
     images = jnp.asarray(pseudo_random("images", (2, 10, 16, 3)), dtype)
     cotangents = tuple(
         jnp.asarray(pseudo_random(name, (2, 5, 8, 4)), dtype)
@@ -79,7 +80,7 @@ def run_encoder(encoder, dtype=jnp.float32) -> dict[str, jax.Array]:
     return dict(zip(names, encode(encoder, images, cotangents), strict=True))
 
 
-def run_decoder(decoder, dtype=jnp.float32) -> jax.Array:
+def run_decoder(decoder, dtype=jnp.float32) -> Array:
     return decode(decoder, jnp.asarray(pseudo_random("latents", (2, 5, 8, 4), 1.7), dtype))
 
 

@@ -5,11 +5,11 @@ import math
 import re
 from pathlib import Path
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from flax import nnx
+from jax import Array
 
 from experiments.parity import clip_cases as cases
 from experiments.parity.arrays import weights
@@ -81,11 +81,11 @@ def whole_arrays() -> dict[str, np.ndarray]:
 
 
 @nnx.jit
-def run(module: nnx.Module, inputs: jax.Array):
+def run(module: nnx.Module, inputs: Array):
     return module(inputs)
 
 
-def assert_close(found: jax.Array, expected: np.ndarray, tolerance: float = 1e-5) -> None:
+def assert_close(found: Array, expected: np.ndarray, tolerance: float = 1e-5) -> None:
     assert found.shape == expected.shape
     assert np.max(np.abs(found - expected)) <= tolerance * np.max(np.abs(expected))
 

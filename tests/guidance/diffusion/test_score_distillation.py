@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax import Array
 
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.diffusion.schedule import Schedule, expand
@@ -19,7 +20,7 @@ PLAIN = DistillationConfig(guidance=1.0, rescale=0.0, limit=None)
 
 
 class Told(NamedTuple):
-    mean: jax.Array
+    mean: Array
 
 
 class GaussianPrior:
