@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
+from tyro.conf import Positional
 
 from jaxphys.core.errors import InputError
-
-Positional = tyro.conf.Positional
 
 
 def generate(

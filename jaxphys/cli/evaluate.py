@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-
-Positional = tyro.conf.Positional
+from tyro.conf import Positional
 
 
 def evaluate(

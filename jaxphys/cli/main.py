@@ -10,6 +10,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 import tyro
 
@@ -104,7 +105,8 @@ def main() -> None:
     """Entry point of the `jaxphys` command."""
     # Warnings of libraries tell users of this command nothing that they could act on.
     warnings.simplefilter("ignore")
-    for stream in (sys.stdout, sys.stderr):
+    streams: tuple[Any, ...] = (sys.stdout, sys.stderr)
+    for stream in streams:
         # A terminal that knows ASCII only gets the code of a letter instead of a traceback.
         if stream is not None:  # as it is where it was closed from outside
             stream.reconfigure(errors="backslashreplace")

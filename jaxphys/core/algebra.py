@@ -7,6 +7,9 @@ particles; a batched `dot_general` of
 3x3 matrices does not, and is what jaxlib 0.10.2 computes wrongly.
 """
 
+from collections.abc import Iterable
+from typing import cast
+
 import jax
 import jax.numpy as jnp
 from jax import Array
@@ -64,10 +67,15 @@ def matmul_transpose(A: Array, B: Array) -> Array:
     )
 
 
+def total(terms: Iterable[Array]) -> Array:
+    """Their sum; there is at least one."""
+    return cast(Array, sum(terms))  # without one it would be the number 0
+
+
 def matvec(A: Array, v: Array) -> Array:
     """A @ v for A (3, 3, ...) and v (3, ...)."""
-    v = components(v)
-    return jnp.stack([row[0] * v[0] + row[1] * v[1] + row[2] * v[2] for row in entries(A)])
+    x, y, z = components(v)
+    return jnp.stack([row[0] * x + row[1] * y + row[2] * z for row in entries(A)])
 
 
 def outer(u: Array, v: Array) -> Array:
@@ -77,12 +85,11 @@ def outer(u: Array, v: Array) -> Array:
 
 def cofactor(A: Array) -> Array:
     """Cofactor matrix: det(A) A^-T, also where A is singular. Shape (3, 3, ...)."""
-
-    A = entries(A)
+    a = entries(A)
 
     def minor(i: int, j: int) -> Array:
-        (a, b), (c, d) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
-        return A[a][c] * A[b][d] - A[a][d] * A[b][c]
+        (p, q), (s, t) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
+        return a[p][s] * a[q][t] - a[p][t] * a[q][s]
 
     return stack_matrix([[minor(i, j) for j in range(3)] for i in range(3)])
 

@@ -53,7 +53,7 @@ def from_names(like: Tree, arrays: Mapping[str, np.ndarray]) -> Tree:
     """The pytree of the structure of `like` that `by_name` made `arrays` of."""
     leaves, structure = jax.tree_util.tree_flatten_with_path(like)
     names = [jax.tree_util.keystr(path, simple=True, separator="/") for path, _ in leaves]
-    return structure.unflatten([jax.numpy.asarray(arrays[name]) for name in names])
+    return jax.tree.unflatten(structure, [jax.numpy.asarray(arrays[name]) for name in names])
 
 
 class Checkpoints:
@@ -153,4 +153,5 @@ class Checkpoints:
         """Removes the steps after `step`, which will be computed again."""
         for later in [later for later in self.steps() if later > step]:
             remove(self._path(later))
-            self._sound.remove(later)
+            if self._sound is not None:
+                self._sound.remove(later)

@@ -9,14 +9,21 @@ import dataclasses
 import types
 import typing
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Protocol, TypeVar
 
 from jaxphys.core.errors import InputError, nearest, one_line, shown
 from jaxphys.core.fields import check_number
 
 MOST_ENTRIES = 10_000
 
-T = TypeVar("T")
+
+class Declared(Protocol):
+    """Any dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+
+
+T = TypeVar("T", bound=Declared)
 Unknown = Callable[[str, Any], None]
 NAMES = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
 
@@ -95,7 +102,7 @@ def _read(kind: Any, value: Any, where: str, rules: Mapping[str, Any]) -> Any:
             raise InputError(f"{where}: unknown value {shown(value)}; {nearest(str(value), parts)}")
         return value
     if dataclasses.is_dataclass(kind):
-        return from_json(kind, value, where)
+        return from_json(typing.cast(type[Any], kind), value, where)
     return _read_plain(kind, value, where, rules)
 
 

@@ -34,8 +34,10 @@ def remove_asides(folder: Path, name: str | None = None, *, alone: bool = False)
     Args:
         alone: nobody else may be writing there, so that a live process of that number is another.
     """
-    for entry in [entry for entry in folder.iterdir() if ASIDE.fullmatch(entry.name)]:
-        number, of = ASIDE.fullmatch(entry.name).groups()
+    for entry, match in [(entry, ASIDE.fullmatch(entry.name)) for entry in folder.iterdir()]:
+        if match is None:
+            continue
+        number, of = match.groups()
         if name in (None, of) and (alone or not _runs(int(number))):
             entry.unlink(missing_ok=True)
 

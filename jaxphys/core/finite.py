@@ -3,7 +3,7 @@
 import numpy as np
 
 # The bits of the exponent, which are all set in infinities and NaN, by bytes and kind of float.
-_EXPONENTS = {
+_EXPONENTS: dict[str, tuple[type[np.unsignedinteger], int]] = {
     "float16": (np.uint16, 0x7C00),
     "bfloat16": (np.uint16, 0x7F80),
     "float32": (np.uint32, 0x7F800000),
@@ -20,8 +20,8 @@ def all_finite(array: np.ndarray) -> bool:
     """
     if array.dtype.name not in _EXPONENTS:
         return True
-    kind, exponent = _EXPONENTS[array.dtype.name]
+    kind, bits = _EXPONENTS[array.dtype.name]
     flat = np.ascontiguousarray(array).reshape(-1).view(kind)
-    exponent = kind(exponent)
+    exponent = kind(bits)
     pieces = (flat[start : start + _AT_ONCE] for start in range(0, flat.size, _AT_ONCE))
     return not any(((piece & exponent) == exponent).any() for piece in pieces)

@@ -37,9 +37,9 @@ def _from_frame(Q: Array, A: Array) -> Array:
 
 def _from_principal(Q: Array, values: Array) -> Array:
     """Q diag(values) Q^T, each of the six different entries once."""
-    Q, values = algebra.entries(Q), algebra.components(values)
-    scaled = [[Q[i][k] * values[k] for k in range(3)] for i in range(3)]
-    entry = {(i, j): _dot(scaled[i], Q[j]) for i in range(3) for j in range(i, 3)}
+    q, w = algebra.entries(Q), algebra.components(values)
+    scaled = [[q[i][k] * w[k] for k in range(3)] for i in range(3)]
+    entry = {(i, j): _dot(scaled[i], q[j]) for i in range(3) for j in range(i, 3)}
     return algebra.stack_matrix([[entry[min(i, j), max(i, j)] for j in range(3)] for i in range(3)])
 
 
@@ -215,11 +215,11 @@ def _left_isotropic_jvp(function, primals, tangents):
     w, Q = eigen_symmetric(optimization_barrier(left_strain(F)))
     e = optimization_barrier(_log_stretches(w))
     half = optimization_barrier(algebra.matmul_transpose(dF, F))
-    D = _to_frame(Q, half + algebra.transpose(half))
+    strain = _to_frame(Q, half + algebra.transpose(half))
 
     free = w > 8 * jnp.finfo(F.dtype).eps - 1
     slope = optimization_barrier(jnp.where(free, 0.5 * jnp.exp(-2 * e), 0))
-    D = algebra.entries(D)
+    D = algebra.entries(strain)
     de = jnp.stack([D[i][i] for i in range(3)]) * slope
     (values, scalars), (dvalues, dscalars) = jax.jvp(function, (e, arguments), (de, darguments))
     values, scalars = optimization_barrier((values, scalars))

@@ -79,7 +79,8 @@ def load_clip(folder: str | Path) -> Clip:
     folder = Path(folder)
     source = folder / "config.json"
     values = read_json(source)
-    text, vision = (kind.from_json(values, str(source)) for kind in (TextConfig, VisionConfig))
+    text = TextConfig.from_json(values, str(source))
+    vision = VisionConfig.from_json(values, str(source))
     tokenizer = ClipTokenizer(folder)
     if tokenizer.size > text.vocab_size:
         raise InputError(

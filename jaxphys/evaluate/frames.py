@@ -40,7 +40,8 @@ def _decoded(path: Path) -> Iterator[np.ndarray]:
         "-i", str(path), "-map", "0:v:0", "-f", "image2pipe", "-c:v", "ppm", "pipe:1",
     ]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        stream = process.stdout
+        stream, complaints = process.stdout, process.stderr
+        assert stream is not None and complaints is not None  # both are pipes
         while stream.readline() == b"P6\n":  # each picture: that, "width height", "255", pixels
             width, height = map(int, stream.readline().split())
             stream.readline()
@@ -48,7 +49,7 @@ def _decoded(path: Path) -> Iterator[np.ndarray]:
             if len(content) < 3 * width * height:
                 break
             yield np.frombuffer(content, np.uint8).reshape(height, width, 3)
-        complaint = process.stderr.read().decode(errors="replace").strip().splitlines()
+        complaint = complaints.read().decode(errors="replace").strip().splitlines()
     if process.returncode:
         why = complaint[-1] if complaint else f"status {process.returncode}"
         raise InputError(f"{path}: cannot be read as a video ({why}); make it again")

@@ -87,7 +87,8 @@ def _grid(points: np.ndarray, config: FillingConfig) -> tuple[np.ndarray, tuple[
             f"out Gaussians far away"
         )
     # About the middle: a symmetric object gets a symmetric grid.
-    return (low + high - cells * config.spacing) / 2, tuple(int(n) for n in cells)
+    nx, ny, nz = (int(n) for n in cells)
+    return (low + high - cells * config.spacing) / 2, (nx, ny, nz)
 
 
 def _cells(points: np.ndarray, origin: np.ndarray, spacing: float) -> np.ndarray:

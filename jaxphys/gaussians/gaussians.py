@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from jax.typing import ArrayLike
 
 from jaxphys.core import algebra
 from jaxphys.core.errors import InputError
@@ -102,7 +103,9 @@ def view_colours(
     ahead = jnp.array([0, 0, 1], offset.dtype)
     direction = jnp.where(apart, offset / jnp.sqrt(jnp.where(apart, squared, 1)), ahead)
     if rotations is not None:
-        direction = sum(rotations[:, axis, :] * direction[:, axis, None] for axis in range(3))
+        direction = algebra.total(
+            rotations[:, axis, :] * direction[:, axis, None] for axis in range(3)
+        )
     return jnp.maximum(sh.evaluate(harmonics, direction) + 0.5, 0)
 
 
@@ -131,12 +134,12 @@ def opacity_to_logit(opacity: Array) -> Array:
 
 
 def from_points(
-    points: Array,
-    colours: Array,
-    sizes: Array | float,
+    points: ArrayLike,
+    colours: ArrayLike,
+    sizes: ArrayLike,
     *,
-    opacity: Array | float = 0.95,
-    quaternions: Array | None = None,
+    opacity: ArrayLike = 0.95,
+    quaternions: ArrayLike | None = None,
     degree: int = 0,
 ) -> Gaussians:
     """Gaussians at `points` with one constant colour each.
@@ -187,7 +190,7 @@ def from_points(
     )
 
 
-def select(gaussians: Gaussians, index: Array | slice) -> Gaussians:
+def select(gaussians: Gaussians, index: Array | np.ndarray | slice) -> Gaussians:
     """The Gaussians at `index`: integers, a slice, or (outside jit) a mask (N,)."""
     return jax.tree.map(lambda leaf: leaf[index], gaussians)
 
@@ -253,7 +256,7 @@ def transform(
     harmonics = gaussians.harmonics
     if rotation is not None:
         rotation = jnp.asarray(rotation, dtype)
-        means = sum(means[:, axis, None] * rotation[:, axis] for axis in range(3))
+        means = algebra.total(means[:, axis, None] * rotation[:, axis] for axis in range(3))
         # A zero quaternion stands for no rotation, and its product would stay zero.
         absent = jnp.sum(quaternions**2, axis=-1, keepdims=True) == 0
         identity = jnp.array([1, 0, 0, 0], dtype)

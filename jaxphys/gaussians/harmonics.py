@@ -12,6 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jaxphys.core import algebra
+
 DC = 0.28209479177387814
 _DEGREE_1 = 0.4886025119029199
 _DEGREE_2 = (
@@ -77,7 +79,7 @@ def evaluate(harmonics: Array, directions: Array) -> Array:
         return DC * harmonics[..., 0, :]
     x, y, z = (directions[..., axis, None] for axis in range(3))
     terms = _basis_list(x, y, z, degree)
-    return sum(term * harmonics[..., index, :] for index, term in enumerate(terms))
+    return algebra.total(term * harmonics[..., index, :] for index, term in enumerate(terms))
 
 
 def _projections() -> list[tuple[np.ndarray, np.ndarray]]:
@@ -90,7 +92,7 @@ def _projections() -> list[tuple[np.ndarray, np.ndarray]]:
     z, turn = 1 - 2 * index / 200, np.pi * (1 + math.sqrt(5)) * index
     radius = np.sqrt(1 - z * z)
     spiral = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=-1)
-    values = np.stack(_basis_list(*spiral.T, MAX_DEGREE), axis=-1)
+    values = np.stack(_basis_list(spiral[:, 0], spiral[:, 1], spiral[:, 2], MAX_DEGREE), axis=-1)
     result = []
     for degree in range(MAX_DEGREE + 1):
         remaining = values[:, degree**2 : (degree + 1) ** 2].copy()
@@ -129,7 +131,7 @@ def rotate(harmonics: Array, rotations: Array) -> Array:
     for order in range(1, degree + 1):
         directions, projection = _PROJECTIONS[order]
         # (..., S, 3): rows of directions times R are R^T d.
-        turned = sum(
+        turned = algebra.total(
             jnp.asarray(directions[:, axis, None], harmonics.dtype) * rotations[..., axis, None, :]
             for axis in range(3)
         )

@@ -5,6 +5,7 @@ import logging
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,7 @@ def _rgba(values, dtype=np.float64) -> np.ndarray:
     return values
 
 
-def _material(material, linear: bool) -> tuple[np.ndarray, object, float]:
+def _material(material, linear: bool) -> tuple[np.ndarray, Any, float]:
     """A material's factor (RGBA, display values), its image or None, and its alpha cutoff.
 
     glTF multiplies the decoded texture by a factor in linear light. Encoding the factor and
@@ -210,7 +211,7 @@ def _require_texels(count: int, path: Path) -> None:
         )
 
 
-def _joined(path: Path, parts: list[tuple[np.ndarray, object]], up: str) -> Mesh:
+def _joined(path: Path, parts: list[tuple[np.ndarray, Any]], up: str) -> Mesh:
     pieces = []
     images: dict[int, int] = {}
     textures: list[np.ndarray] = []
@@ -267,7 +268,7 @@ def _joined(path: Path, parts: list[tuple[np.ndarray, object]], up: str) -> Mesh
         pieces.append((corners, colours, uvs, np.full(count, index), np.full(count, cutoff)))
     if not pieces:
         raise InputError(f"{path}: no triangles (a point cloud or an empty file); give a surface")
-    corners, colours, uvs, texture, cutoff = (np.concatenate(p) for p in zip(*pieces, strict=True))
+    corners, colours, uvs, texture, cutoffs = (np.concatenate(p) for p in zip(*pieces, strict=True))
     bad = ~(np.abs(corners) < _LONGEST).all(axis=(1, 2))
     if bad.any():
         raise InputError(
@@ -279,7 +280,7 @@ def _joined(path: Path, parts: list[tuple[np.ndarray, object]], up: str) -> Mesh
     if up == "y":
         corners = np.stack([corners[..., 0], -corners[..., 2], corners[..., 1]], axis=-1)
     uvs = np.clip(np.nan_to_num(uvs), -_MOST_REPEATS, _MOST_REPEATS)
-    return Mesh(corners, colours, uvs, tuple(textures), texture, cutoff)
+    return Mesh(corners, colours, uvs, tuple(textures), texture, cutoffs)
 
 
 def _require_solid(path: Path, mesh: Mesh) -> None:

@@ -161,10 +161,11 @@ def _read_table(file: BinaryIO, path, style: str, elements: list[_Element], limi
             f"{path}: {element.count * dtype.itemsize / 2**30:.1f} GiB of Gaussians, more than the "
             f"limit of {_TABLE_BYTES // 2**30}; thin it out"
         )
+    names = dtype.names or ()
     if style == "ascii":
         skipped = sum(other.count for other in before)
-        values = _read_lines(file, path, skipped, element.count, len(dtype.names), truncated)
-        return {name: values[:, i] for i, name in enumerate(dtype.names)}
+        values = _read_lines(file, path, skipped, element.count, len(names), truncated)
+        return {name: values[:, i] for i, name in enumerate(names)}
     skipped = sum(other.count * other.dtype("<").itemsize for other in before)
     wanted = element.count * dtype.itemsize
     start = file.tell() + skipped
@@ -178,7 +179,7 @@ def _read_table(file: BinaryIO, path, style: str, elements: list[_Element], limi
         )
     file.seek(start)
     table = np.frombuffer(file.read(wanted), dtype)
-    return {name: table[name] for name in dtype.names}
+    return {name: table[name] for name in names}
 
 
 def _read_lines(file: BinaryIO, path, skipped: int, count: int, width: int, truncated: InputError):

@@ -146,7 +146,7 @@ def guides(
     attention_slice: int | None = None,
 ) -> Guides:
     """Both guides, see `image_guide` and `shape_guide`."""
-    options = {"negative": negative, "dtype": dtype, "attention_slice": attention_slice}
-    return Guides(
-        image_guide(prior, prompt, **options), shape_guide(shape_prior, prompt, dtype=dtype)
+    image = image_guide(
+        prior, prompt, negative=negative, dtype=dtype, attention_slice=attention_slice
     )
+    return Guides(image, shape_guide(shape_prior, prompt, dtype=dtype))

@@ -111,7 +111,8 @@ def _transform(config: OptimiseConfig) -> optax.GradientTransformation:
         name: optax.adam(optax.exponential_decay(rate, steps, 0.1), eps=1e-15)
         for name, rate in config.rates
     }
-    labels = Gaussians(**{name: name for name, _ in config.rates})
+    names: dict[str, Any] = {name: name for name, _ in config.rates}
+    labels = Gaussians(**names)
     return optax.multi_transform(groups, labels)
 
 
@@ -143,7 +144,7 @@ def regularity(gaussians: Gaussians, alive: Array, config: OptimiseConfig) -> Ar
     return jnp.mean(jnp.where(alive[:, None], large + 0.02 * needle + outside, 0))
 
 
-@partial(nnx.jit, static_argnames=("config", "capacity"))
+@nnx.jit(static_argnames=("config", "capacity"))
 def advance(
     guides: Guides, state: OptimiseState, key: Array, config: OptimiseConfig, capacity: int
 ) -> tuple[OptimiseState, Array]:
@@ -157,7 +158,8 @@ def advance(
 
     def loss(gaussians: Gaussians) -> tuple[Array, Array]:
         def picture(view):
-            image = view_picture(gaussians, *view, capacity, guides.image.resolution)
+            turn, rise, floor = view
+            image = view_picture(gaussians, turn, rise, floor, capacity, guides.image.resolution)
             return image.colour, image.overflow
 
         images, overflow = jax.lax.map(picture, (azimuth, elevation, ground))

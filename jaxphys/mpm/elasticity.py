@@ -93,11 +93,13 @@ def hencky_density(mu: Array, lam: Array, e: Array) -> Array:
 
 
 def _hencky_stress_values(e, moduli):
-    return (hencky_principal_stress(*moduli, e),), ()
+    mu, lam = moduli
+    return (hencky_principal_stress(mu, lam, e),), ()
 
 
 def _hencky_energy_value(e, moduli):
-    return (), (hencky_density(*moduli, e),)
+    mu, lam = moduli
+    return (), (hencky_density(mu, lam, e),)
 
 
 def hencky_stress(parameters: Parameters, F: Array) -> Array:

@@ -55,10 +55,10 @@ def rollout_frames(simulation: Simulation, frames: int, *, adjoint: Adjoint = PL
         return state, look(state)
 
     _, rest = jax.lax.scan(body, simulation.state, length=frames - 1)
-    parts = jax.tree.map(
+    position, deformation, time, status = jax.tree.map(
         lambda first, after: jnp.concatenate([first[None], after]), look(simulation.state), rest
     )
-    return Motion(*parts, simulation.carriers)
+    return Motion(position, deformation, time, status, simulation.carriers)
 
 
 @partial(jax.jit, static_argnames="config")

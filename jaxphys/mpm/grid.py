@@ -33,7 +33,8 @@ class Grid:
     @property
     def extent(self) -> tuple[float, float, float]:
         """Coordinates of the last node [m]: the domain's upper ends."""
-        return tuple((n - 1) * self.spacing for n in self.shape)
+        x, y, z = ((n - 1) * self.spacing for n in self.shape)
+        return x, y, z
 
     @property
     def lower(self) -> float:
@@ -43,7 +44,8 @@ class Grid:
     @property
     def upper(self) -> tuple[float, float, float]:
         """Coordinates that particles must stay below, per axis [m]."""
-        return tuple((n - 1.5) * self.spacing for n in self.shape)
+        x, y, z = ((n - 1.5) * self.spacing for n in self.shape)
+        return x, y, z
 
 
 def node_coordinates(
@@ -57,4 +59,5 @@ def node_coordinates(
     for axis, count in enumerate(shape):
         line = (jnp.arange(count) + origin[axis]).astype(dtype) * spacing
         coordinates.append(line.reshape([-1 if a == axis else 1 for a in range(3)]))
-    return tuple(coordinates)
+    x, y, z = coordinates
+    return x, y, z

@@ -41,7 +41,7 @@ class Law:
     history: tuple[float, ...]
     history_names: tuple[str, ...]
     update: Callable[[Parameters, Array, Array], tuple[Array, Array, Array]]
-    energy: Callable[[Parameters, Array], Array]
+    energy: Callable[[Parameters, Array, Array], Array]
     principal_energy: Callable[[Parameters, Array], Array]
     plastic: bool
     spectral: bool = False

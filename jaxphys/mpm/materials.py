@@ -143,7 +143,7 @@ def overridden(material: Material, overrides: Mapping | None) -> dict:
         if given in ALTERNATIVES:
             name = ALTERNATIVES[given].name
             value = np.asarray(ALTERNATIVES[given].convert(np.asarray(value, np.float64)))
-            if name in overrides:
+            if name in (overrides or {}):
                 raise InputError(f"{material.name}: give {name} or {given}, not both")
         found[name] = value
     return found

@@ -43,7 +43,7 @@ class Alternative:
     """Another way to give a parameter: `convert` turns it into the one called `name`."""
 
     name: str
-    convert: Callable[[Array], Array]
+    convert: Callable[[np.ndarray], Array]
 
 
 INFINITY = float("inf")

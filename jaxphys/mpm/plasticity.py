@@ -12,6 +12,7 @@ nothing yields the change is zero and F stays bit for bit what it was.
 import math
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from jaxphys.core import algebra
@@ -120,7 +121,9 @@ COEFFICIENTS = {
 }
 
 
-def friction_coefficient(friction_angle: Array, test: str = "triaxial compression") -> Array:
+def friction_coefficient(
+    friction_angle: Array | np.ndarray, test: str = "triaxial compression"
+) -> Array:
     """The slope alpha of the cone |dev tau| = -alpha tr(tau) that slides where Mohr and Coulomb's
     law with the friction angle phi does in one test.
 
@@ -141,7 +144,7 @@ def friction_coefficient(friction_angle: Array, test: str = "triaxial compressio
     return COEFFICIENTS[test](jnp.sin(friction_angle * (math.pi / 180)))
 
 
-def triaxial_friction_angle(plane_strain_angle: Array) -> Array:
+def triaxial_friction_angle(plane_strain_angle: Array | np.ndarray) -> Array:
     """The `friction_angle` [degrees] of the cone that slides at `plane_strain_angle` [degrees] in
     plane strain: what a parameter `plane_strain_friction_angle` stands for.
     """

@@ -1,6 +1,7 @@
 """Many steps in one compiled program, and what becomes of a simulation that fails."""
 
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -125,7 +126,8 @@ def _keep_good(before: State, after: State) -> State:
     """`after`, or where it failed `before` with the status and step count of the failure."""
     good = after.status.code == OK
     residual = jax.tree.map(partial(jnp.where, good), after.residual, before.residual)
-    rest = (state._replace(status=None, residual=None) for state in (after, before))
+    without: dict[str, Any] = {"status": None, "residual": None}
+    rest = (state._replace(**without) for state in (after, before))
     kept = jax.tree.map(partial(_choose, good), *rest)
     return kept._replace(status=after.status, residual=jax.lax.stop_gradient(residual))
 

@@ -10,6 +10,7 @@ from jax import Array
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.law import Law
 
 CODES = 8
 (
@@ -39,7 +40,7 @@ class Config:
     """
 
     grid: Grid
-    segments: tuple[tuple[object, int, int], ...]
+    segments: tuple[tuple[Law, int, int], ...]
     track_total: bool = False
     window: tuple[int, int, int] | None = None
     check_step: bool = True
@@ -124,10 +125,10 @@ class Residual(NamedTuple):
     but the next sum reads it, and no gradient goes through it.
     """
 
-    position: Array
-    deformation: Array
+    position: Array | None
+    deformation: Array | None
     total: Array | None
-    time: Array
+    time: Array | None
 
 
 class State(NamedTuple):

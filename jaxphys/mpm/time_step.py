@@ -68,8 +68,8 @@ def moduli(law: Law, parameters: Parameters, s: Array) -> tuple[Array, Array]:
     def slope(s):
         return jax.grad(lambda x: jnp.sum(law.principal_energy(parameters, x)))(s)
 
-    directions = np.eye(3, dtype=s.dtype).reshape(3, 3, *[1] * (s.ndim - 1))
-    directions = jnp.broadcast_to(directions, (3, *s.shape))
+    axes = np.eye(3, dtype=s.dtype).reshape(3, 3, *[1] * (s.ndim - 1))
+    directions = jnp.broadcast_to(axes, (3, *s.shape))
     first, second = jax.vmap(lambda d: jax.jvp(slope, (s,), (d,)), out_axes=(None, 0))(directions)
     # The pairs (0, 1), (1, 2), (2, 0) of each array with the one after it.
     after = jnp.roll(s, -1, axis=0)
@@ -142,7 +142,8 @@ def present_bounds(
     present = moduli(law, parameters, principal_stretches(F))
     # F F^T does not tell the moduli of a state that has lost its stiffness from those at rest.
     largest = map(jnp.maximum, present, rest_moduli(parameters))
-    return tuple(_step_of(spacing, density, modulus) for modulus in largest)
+    first, second = (_step_of(spacing, density, modulus) for modulus in largest)
+    return first, second
 
 
 def isolated_bound(
@@ -195,11 +196,11 @@ def contact_bound(model, grid) -> Array:
 
 def hard_limits(config, model, state) -> Array:
     """The step [s] beyond which each particle is unstable as it is now, (N,)."""
-    limits = [
+    each = [
         jnp.minimum(*bounds)
         for bounds in _by_segment(config, model, present_bounds, state.deformation)
     ]
-    limits = limits[0] if len(limits) == 1 else jnp.concatenate(limits)
+    limits = each[0] if len(each) == 1 else jnp.concatenate(each)
     return jnp.minimum(limits, contact_bound(model, config.grid))
 
 

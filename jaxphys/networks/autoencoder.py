@@ -13,7 +13,7 @@ from jaxphys.networks import transformer
 from jaxphys.networks.diffusers_config import LAYERS, NUMBER, SIZE, DiffusersConfig
 from jaxphys.networks.layers import Conv2d, GroupNorm, Linear
 from jaxphys.networks.resnet import COSTLY, Downsample, ResnetBlock, Upsample
-from jaxphys.networks.transformer import CrossAttention
+from jaxphys.networks.transformer import Attention
 
 # The files of Stable Diffusion 1 and 2 have the first four names, later ones those of the UNet.
 RENAMES = (
@@ -74,7 +74,7 @@ def _through(blocks: Sequence[nnx.Module], x: Array) -> Array:
     return x
 
 
-class PixelAttention(CrossAttention):
+class PixelAttention(Attention):
     """x + attention of one head among the pixels of (B, H, W, C)."""
 
     def __init__(self, width: int, config: AutoencoderConfig):
@@ -83,7 +83,7 @@ class PixelAttention(CrossAttention):
 
     def __call__(self, x: Array) -> Array:
         tokens = self.group_norm(x).reshape(x.shape[0], -1, x.shape[-1])
-        return x + super().__call__(tokens, tokens).reshape(x.shape)
+        return x + self.from_to(tokens, tokens).reshape(x.shape)
 
 
 class EncoderBlock(nnx.Module):

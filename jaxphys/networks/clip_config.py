@@ -4,8 +4,8 @@ Fields are named as in the file. Their defaults are those of the published forma
 what does not differ from them.
 """
 
-from dataclasses import dataclass, field
-from typing import Any, Self
+from dataclasses import Field, dataclass, field
+from typing import Any, ClassVar, Self
 
 from jaxphys.core.dataclass_reader import from_json
 from jaxphys.core.errors import InputError, nearest, shown
@@ -19,8 +19,16 @@ LAYERS = between(1, 1000)
 EPSILON = {"above": 0, "most": 1.0}
 
 
-@dataclass(frozen=True)
 class _Tower:
+    """Base of the two, which are dataclasses."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+    PART: ClassVar[str]
+    MODEL_TYPE: ClassVar[str]
+    hidden_act: str
+    hidden_size: int
+    num_attention_heads: int
+
     def __post_init__(self):
         if self.hidden_act not in ACTIVATIONS:
             tail = nearest(self.hidden_act, ACTIVATIONS)
@@ -65,8 +73,8 @@ class TextConfig(_Tower):
     of a text is its largest id.
     """
 
-    PART = "text_config"
-    MODEL_TYPE = "clip_text_model"
+    PART: ClassVar[str] = "text_config"
+    MODEL_TYPE: ClassVar[str] = "clip_text_model"
 
     vocab_size: int = field(default=49408, metadata=SIZE)
     hidden_size: int = field(default=512, metadata=SIZE)
@@ -84,8 +92,8 @@ class TextConfig(_Tower):
 class VisionConfig(_Tower):
     """The picture tower: squares of `image_size` pixels in patches of `patch_size`."""
 
-    PART = "vision_config"
-    MODEL_TYPE = "clip_vision_model"
+    PART: ClassVar[str] = "vision_config"
+    MODEL_TYPE: ClassVar[str] = "clip_vision_model"
 
     hidden_size: int = field(default=768, metadata=SIZE)
     intermediate_size: int = field(default=3072, metadata=SIZE)

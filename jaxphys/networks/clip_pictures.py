@@ -22,4 +22,4 @@ def middle_square(picture: np.ndarray, size: int = 224) -> np.ndarray:
 def as_pixels(pictures: np.ndarray) -> np.ndarray:
     """(..., 3) uint8 RGB -> float32, with the mean and spread that CLIP was trained on."""
     unit = pictures.astype(np.float32) / np.float32(255)
-    return (unit - np.float32(MEAN)) / np.float32(DEVIATION)
+    return (unit - np.asarray(MEAN, np.float32)) / np.asarray(DEVIATION, np.float32)

@@ -104,9 +104,10 @@ def _pieces(folder: Path) -> tuple[dict[str, int], list[tuple[str, str]], Path]:
     elif whole.exists():
         model, source = read_json(whole).get("model"), whole
         parts = model if isinstance(model, dict) else {}
-        vocabulary, pairs = parts.get("vocab"), parts.get("merges")
-        if not isinstance(vocabulary, dict) or not isinstance(pairs, list):
+        entries, merged = parts.get("vocab"), parts.get("merges")
+        if not isinstance(entries, dict) or not isinstance(merged, list):
             raise InputError(f"{whole}: model: holds no vocab and merges; get the file again")
+        vocabulary, pairs = entries, merged
     else:
         raise InputError(
             f"{folder}: holds neither vocab.json and merges.txt nor tokenizer.json;"
@@ -115,7 +116,7 @@ def _pieces(folder: Path) -> tuple[dict[str, int], list[tuple[str, str]], Path]:
     split = [pair.split(" ") if isinstance(pair, str) else pair for pair in pairs]
     if not all(isinstance(pair, list) and len(pair) == 2 for pair in split):
         raise InputError(f"{folder}: a merge is not of two pieces; get the tokenizer again")
-    return vocabulary, [tuple(pair) for pair in split], source
+    return vocabulary, [(first, second) for first, second in split], source
 
 
 def _named_marks(folder: Path) -> dict[str, AddedToken]:

@@ -88,11 +88,11 @@ def _whole(x: Array, kernel: Array, stride: int, padding: Padding) -> Array:
 def _by_taps(x: Array, kernel: Array, padding: Padding) -> Array:
     padded = jnp.pad(x, ((0, 0), *padding, (0, 0)))
     height, width = (padded.shape[1 + axis] - kernel.shape[axis] + 1 for axis in range(2))
-    total = 0.0
+    total: Array | float = 0.0
     for i, j in np.ndindex(kernel.shape[:2]):
         part = product(padded[:, i : i + height, j : j + width], kernel[i, j])
         total = lax.optimization_barrier(total + part)  # lest all parts be held at once
-    return total.astype(x.dtype)
+    return jnp.asarray(total).astype(x.dtype)
 
 
 def _convolve_forward(

@@ -34,7 +34,8 @@ def with_parameters(module: Module, parameters: dict[str, Array]) -> Module:
     """
     graph, state = nnx.split(module, nnx.Param)
     leaves, structure = jax.tree_util.tree_flatten_with_path(state)
-    return nnx.merge(graph, structure.unflatten([parameters[_name(path)] for path, _ in leaves]))
+    named = [parameters[_name(path)] for path, _ in leaves]
+    return nnx.merge(graph, jax.tree.unflatten(structure, named))
 
 
 def published_name(name: str) -> str:
@@ -84,7 +85,7 @@ def fill(
     module = nnx.eval_shape(build)
     wanted = {published_name(name): name for name in named_parameters(module)}
     shapes = {name: leaf.shape for name, leaf in named_parameters(module).items()}
-    found = {}
+    found: dict[str, str] = {}
     for key in arrays:
         name = key
         for pattern, replacement in renames:

@@ -29,6 +29,7 @@ class ResnetBlock(nnx.Module):
         """time: (B, time), where the block was made to be told."""
         inner = checkpoint_name(self.conv1(jax.nn.silu(self.norm1(x))), COSTLY)
         if self.time_emb_proj is not None:
+            assert time is not None
             inner = inner + self.time_emb_proj(jax.nn.silu(time))[:, None, None]
         inner = self.conv2(jax.nn.silu(self.norm2(inner)))
         return inner + (x if self.conv_shortcut is None else self.conv_shortcut(x))

@@ -15,8 +15,8 @@ RENAMES = (
 )
 
 
-class CrossAttention(nnx.Module):
-    """Multi-head attention (Vaswani et al. 2017) of (B, T, width) tokens to (B, S, context)."""
+class Attention(nnx.Module):
+    """Multi-head attention (Vaswani et al. 2017); subclasses say of what to what."""
 
     def __init__(self, width: int, context: int, heads: int, *, bias: bool, slice_size: int | None):
         self.heads, self.slice_size = heads, slice_size
@@ -25,11 +25,19 @@ class CrossAttention(nnx.Module):
         self.to_v = Linear(context, width, bias=bias)
         self.to_out = Linear(width, width)
 
-    def __call__(self, x: Array, context: Array) -> Array:
+    def from_to(self, x: Array, context: Array) -> Array:
+        """Of (B, T, width) tokens to (B, S, context)."""
         queries = split_heads(self.to_q(x), self.heads)
         keys = split_heads(self.to_k(context), self.heads)
         values = split_heads(self.to_v(context), self.heads)
         return self.to_out(join_heads(attend(queries, keys, values, slice_size=self.slice_size)))
+
+
+class CrossAttention(Attention):
+    """Attention of (B, T, width) tokens to (B, S, context)."""
+
+    def __call__(self, x: Array, context: Array) -> Array:
+        return self.from_to(x, context)
 
 
 class GatedPerceptron(nnx.Module):

@@ -172,7 +172,8 @@ class UpBlock(nnx.Module):
             if self.attentions:
                 x = self.attentions[number](x, states)
         for upsample in self.upsamplers:
-            x = upsample(x, passed[-1].shape[1:3])
+            height, width = passed[-1].shape[1:3]
+            x = upsample(x, (height, width))
         return x
 
 
@@ -187,15 +188,17 @@ class UNet(nnx.Module):
         self.time_embedding = TimestepEmbedding(widths[0], config.time)
         x, skips, down, up = widths[0], [widths[0]], [], []
         for i, kind in enumerate(config.down_block_types):
-            options = {"heads": heads[i], "reads": kind == DOWN_READING, "last": i == final}
-            down.append(DownBlock(x, widths[i], config, **options))
+            reads = kind == DOWN_READING
+            down.append(
+                DownBlock(x, widths[i], config, heads=heads[i], reads=reads, last=i == final)
+            )
             x = widths[i]
             skips += [x] * (config.layers_per_block + (i < final))
         self.mid_block = MiddleBlock(x, config, heads=heads[-1])
         for i, kind in zip(range(final, -1, -1), config.up_block_types, strict=True):
-            options = {"heads": heads[i], "reads": kind == UP_READING, "last": i == 0}
             read = [skips.pop() for _ in range(config.layers_per_block + 1)]
-            up.append(UpBlock(x, read, widths[i], config, **options))
+            reads = kind == UP_READING
+            up.append(UpBlock(x, read, widths[i], config, heads=heads[i], reads=reads, last=i == 0))
             x = widths[i]
         self.down_blocks, self.up_blocks = nnx.List(down), nnx.List(up)
         self.conv_norm_out = GroupNorm(config.norm_num_groups, x, epsilon=config.norm_eps)
@@ -219,9 +222,9 @@ class UNet(nnx.Module):
         )
         time = self.time_embedding(features.astype(latents.dtype))
         passed = [self.conv_in(latents)]
-        for block in self.down_blocks:
-            passed += block(passed[-1], time, states)
+        for going_down in self.down_blocks:
+            passed += going_down(passed[-1], time, states)
         x = self.mid_block(passed[-1], time, states)
-        for block in self.up_blocks:
-            x = block(x, passed, time, states)
+        for going_up in self.up_blocks:
+            x = going_up(x, passed, time, states)
         return self.conv_out(jax.nn.silu(self.conv_norm_out(x)))

@@ -44,7 +44,7 @@ def splat_mesh(
     check_number("--count", count, between(1, MOST_SPLATS))
     check_number("--seed", seed, SEED)
     output_file(out, overwrite=overwrite, inputs=(mesh,))
-    writers[out.suffix.lower()](out, load(mesh, count=count, seed=seed))
+    writers[out.suffix.lower()](out, load(Path(mesh), count=count, seed=seed))
 
 
 def outline(gaussians: Gaussians) -> np.ndarray:
@@ -80,7 +80,7 @@ def render_file(
     check_number("--views", views, between(1, 10_000))
     for value in background:
         check_number("--background", value, between(0, 1))
-    gaussians = load(file)
+    gaussians = load(Path(file))
     out = Path(out)
     single = out.suffix.lower() == ".png"
     if not single and out.suffix:

@@ -56,7 +56,7 @@ def to_world(similarity: Similarity, positions: Array, deformation: Array) -> tu
     """
     Q = similarity.rotation
     centred = (positions - similarity.translation) / similarity.scale
-    points = sum(centred[:, axis, None] * Q[axis] for axis in range(3))
+    points = algebra.total(centred[:, axis, None] * Q[axis] for axis in range(3))
     F, Q = jnp.moveaxis(deformation, 0, -1), Q[:, :, None]
     F = algebra.matmul(algebra.transpose(Q), algebra.matmul(F, Q))
     return points, jnp.moveaxis(F, -1, 0)

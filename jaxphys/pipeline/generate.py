@@ -138,7 +138,7 @@ def _optimise(
     from jaxphys.guidance import choice, optimise
 
     given = {"steps": generation.steps, "count": generation.splats}
-    changes = {name: value for name, value in given.items() if value is not None}
+    changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     usual = choice.settings(generation.prior, generation.shape_prior)
     config = dataclasses.replace(usual, **changes)
     guides = choice.guides(

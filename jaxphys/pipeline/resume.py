@@ -2,7 +2,9 @@
 
 import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +36,10 @@ class MotionCheckpoint:
         if self._saved <= last:
             text = json.dumps(metrics[self._saved :]).encode()
             arrays = by_name(join(frames[self._saved :]))
-            arrays |= {"first": np.int64(self._saved), "metrics": np.frombuffer(text, np.uint8)}
+            arrays |= {
+                "first": np.asarray(self._saved, np.int64),
+                "metrics": np.frombuffer(text, np.uint8),
+            }
             self._frames.save(last, arrays)
             self._saved = last + 1
         if last not in self._states.steps():
@@ -74,6 +79,7 @@ class MotionCheckpoint:
 
 
 def _motion(piece: dict[str, np.ndarray]) -> Motion:
-    status = Status(*(piece[f"status/{name}"] for name in Status._fields))
-    names = ("position", "deformation", "time")
-    return Motion(*(piece[name] for name in names), status, piece["carriers"])
+    arrays: Mapping[str, Any] = piece  # of numpy, as everything in files
+    status = Status(*(arrays[f"status/{name}"] for name in Status._fields))
+    position, deformation, time = (arrays[name] for name in ("position", "deformation", "time"))
+    return Motion(position, deformation, time, status, arrays["carriers"])

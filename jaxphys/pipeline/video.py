@@ -47,6 +47,8 @@ class VideoWriter:
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, process_group=0
         )
+        assert self._process.stdin is not None and self._process.stderr is not None  # pipes
+        self._pictures, self._complaints = self._process.stdin, self._process.stderr
         self._queue: queue.Queue[np.ndarray | None] = queue.Queue(WAITING)
         self._failure: OSError | None = None
         self._thread = threading.Thread(target=self._feed, name="video", daemon=True)
@@ -56,7 +58,7 @@ class VideoWriter:
         while (picture := self._queue.get()) is not None:
             if self._failure is None:
                 try:
-                    self._process.stdin.write(np.pad(picture, self._padding, "edge").tobytes())
+                    self._pictures.write(np.pad(picture, self._padding, "edge").tobytes())
                 except OSError as error:
                     self._failure = error
 
@@ -83,8 +85,8 @@ class VideoWriter:
         self._process.wait()
         self._queue.put(None)
         self._thread.join()
-        self._process.stdin.close()
-        self._process.stderr.close()
+        self._pictures.close()
+        self._complaints.close()
 
     def __enter__(self) -> Self:
         return self

@@ -44,7 +44,7 @@ class Column:
         """4 H / c [s]."""
         return 4 * self.height / self.wave_speed
 
-    def static_displacement(self, x: Array) -> Array:
+    def static_displacement(self, x: Array | float) -> Array | float:
         """u(x) [m] of the column at rest."""
         weight = self.density * self.gravity
         return -weight / self.youngs * (self.height * x - x**2 / 2)

@@ -9,7 +9,7 @@ scheme, second order in dt, when v is read as the velocity half a step before x.
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -49,7 +49,7 @@ class Discretisation:
         count: how many particles are the problem's.
     """
 
-    truth: object
+    truth: Any
     config: Config
     model: Model
     state: State
@@ -74,7 +74,7 @@ class BodyForce(Boundary):
     """
 
     type: ClassVar[str] = "body force"
-    truth: object
+    truth: Any
     origin: Array
     spacing: Array
     share: Array
@@ -235,7 +235,8 @@ def energy(problem: Discretisation, state: State) -> float:
     """
     ((law, _, _),) = problem.config.segments
     speed = jnp.sum(state.velocity**2, axis=0) + 0.25 * jnp.sum(state.affine**2, axis=(0, 1))
-    stored = law.energy(problem.model.parameters, state.deformation, state.history)
+    history = jnp.zeros((0, state.position.shape[1])) if state.history is None else state.history
+    stored = law.energy(problem.model.parameters, state.deformation, history)
     return float(jnp.sum(0.5 * problem.model.mass * speed + problem.model.volume * stored))
 
 

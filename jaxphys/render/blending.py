@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array, lax
 
+from jaxphys.core import algebra
 from jaxphys.render.binning import Boxes, Grid, TileLists
 from jaxphys.render.blending_gradient import blend_backward
 from jaxphys.render.settings import Settings
@@ -81,7 +82,9 @@ def _forward(geometry, features, boxes, lists, grid, settings):
 
 def _features_sum(weights: Array, features: Array) -> Array:
     """Sum over the chunk of w_i f_i: (G, C, P), (G, C, F) -> (G, F, P)."""
-    return sum(weights[:, k, None, :] * features[:, k, :, None] for k in range(weights.shape[1]))
+    return algebra.total(
+        weights[:, k, None, :] * features[:, k, :, None] for k in range(weights.shape[1])
+    )
 
 
 def _blend_forward(geometry, features, boxes, lists, grid, settings):

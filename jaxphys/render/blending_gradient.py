@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array, lax
 
+from jaxphys.core import algebra
 from jaxphys.render.binning import Boxes, Grid, slot_owners
 from jaxphys.render.tile_groups import (
     Work,
@@ -112,7 +113,7 @@ def _remainders(terms: Array, behind: Array) -> tuple[Array, Array]:
 
 def _feature_dot(features: Array, g: Array) -> Array:
     """g . f_i for every pixel: (G, C, F), (G, F, P) -> (G, C, P)."""
-    return sum(features[:, :, f, None] * g[:, None, f] for f in range(g.shape[1]))
+    return algebra.total(features[:, :, f, None] * g[:, None, f] for f in range(g.shape[1]))
 
 
 def _monomials(grid: Grid, dtype) -> Array:
@@ -191,8 +192,6 @@ def _fold(slots: Array, starts: Array, counts: Array, room: int) -> tuple[Array,
     owners = slot_owners(begins, shorter, room)
     done = FOLD * (jnp.arange(room, dtype=jnp.int32) - begins[owners])
     first, left = starts[owners] + done, counts[owners] - done
-    summed = 0.0
-    for k in range(FOLD):
-        row = slots.at[first + k].get(mode="clip")
-        summed = summed + jnp.where((k < left)[:, None], row, 0)
+    rows = (slots.at[first + k].get(mode="clip") for k in range(FOLD))
+    summed = algebra.total(jnp.where((k < left)[:, None], row, 0) for k, row in enumerate(rows))
     return summed, begins, shorter

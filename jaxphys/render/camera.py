@@ -128,12 +128,12 @@ def orbit(
         elevation: above the horizon [rad], in [-pi/2, pi/2].
         field_of_view, width, height, dtype: as in `look_at`.
     """
-    azimuth, elevation = jnp.asarray(azimuth, dtype), jnp.asarray(elevation, dtype)
+    turn, rise = jnp.asarray(azimuth, dtype), jnp.asarray(elevation, dtype)
     offset = distance * jnp.stack(
         [
-            jnp.cos(elevation) * jnp.cos(azimuth),
-            jnp.cos(elevation) * jnp.sin(azimuth),
-            jnp.sin(elevation),
+            jnp.cos(rise) * jnp.cos(turn),
+            jnp.cos(rise) * jnp.sin(turn),
+            jnp.sin(rise),
         ]
     )
     target = jnp.asarray(target, dtype)

@@ -157,10 +157,10 @@ def _concrete(value: Array):
 def _check(splats: Splats, camera: Camera, background) -> None:
     count = splats.means.shape[0]
     channels = splats.colours.shape[-1]
-    expected = Splats((count, 3), (count, 3, 3), (count,), (count, channels))
-    for name, array, shape in zip(Splats._fields, splats, expected, strict=True):
-        if array.shape != shape:
-            raise InputError(f"splats.{name} has shape {array.shape}, expected {shape}")
+    expected = ((count, 3), (count, 3, 3), (count,), (count, channels))
+    for name, array, wanted in zip(Splats._fields, splats, expected, strict=True):
+        if array.shape != wanted:
+            raise InputError(f"splats.{name} has shape {array.shape}, expected {wanted}")
     shape = jnp.shape(background)
     allowed = ((), (channels,), (1,), (camera.height, camera.width, channels))
     if shape not in allowed:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 from jax import Array
 
+from jaxphys.core import algebra
+
 
 def stable_order(keys: Array, bits: int) -> Array:
     """Indices that sort `keys`, uint32 (N,) below 2^bits, equal keys by index. int32 (N,).
@@ -51,4 +53,4 @@ def group_stably(
         merged = merged.at[slot].set(
             (part - group * step).astype(jnp.int32), mode="drop", unique_indices=True
         )
-    return merged, sum(firsts)
+    return merged, algebra.total(firsts)

@@ -107,7 +107,8 @@ def _fracture(domain: Domain) -> Scene:
         place, half_size = list(centre), [size] * 3
         place[axis] += offset * size
         half_size[axis] = 0.035
-        flaws.append(Region(tuple(place), tuple(half_size), weak))
+        (x, y, z), (a, b, c) = place, half_size
+        flaws.append(Region((x, y, z), (a, b, c), weak))
     thing = Object(
         material="fracture",
         regions=tuple(flaws),

@@ -1,7 +1,7 @@
 """Objects put where a scene wants them: chosen, turned, scaled, moved, filled."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -136,7 +136,8 @@ def _lone(means: np.ndarray, size: float, grid: Grid) -> np.ndarray:
 def _config(thing: Object, grid: Grid) -> FillingConfig:
     """How an object is filled, in a frame about its middle."""
     filling = thing.filling
-    area = filling.area
+    assert filling is not None  # a hollow object is not asked
+    area: Any = filling.area
     if area is not None:
         area = tuple(np.asarray(area) - np.repeat(thing.centre, 2))
     return FillingConfig(

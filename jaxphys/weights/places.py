@@ -53,8 +53,9 @@ def places(entry: Entry, environment: Mapping[str, str]) -> Iterator[Path]:
     """The folders that may hold the files of `entry`, the first to be taken first."""
     yield own_folder(entry, environment)
     cache = hub_cache(environment)
-    for repository in entry.repositories if cache is not None else ():
-        yield from _snapshots(cache, repository)
+    if cache is not None:
+        for repository in entry.repositories:
+            yield from _snapshots(cache, repository)
     if entry.package:
         yield from _package_folders(entry.package)
 

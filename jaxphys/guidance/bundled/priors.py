@@ -1,5 +1,6 @@
 """The bundled priors: modules from named arrays, and the arrays from files."""
 
+from collections.abc import Callable
 from dataclasses import fields
 from functools import cache
 from typing import Any, TypeVar
@@ -25,7 +26,9 @@ def require_prior(name: str) -> None:
         )
 
 
-def _load(name: str, kind: type[Module], config_type: type) -> tuple[Module, dict[str, Any]]:
+def _load(
+    name: str, kind: Callable[..., Module], config_type: type
+) -> tuple[Module, dict[str, Any]]:
     arrays, entry = weights.load(name)
     known = {field.name for field in fields(config_type)}
     config = config_type(**{k: v for k, v in entry["config"].items() if k in known})

@@ -7,7 +7,7 @@ bundled weights hold its linear layers in 6 bits and its plain Latin word pieces
 
 from collections.abc import Sequence
 from functools import cache
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +18,10 @@ from jaxphys import weights
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.bundled.quantise import Packed, unpack
 from jaxphys.guidance.guides import object_of
+
+if TYPE_CHECKING:
+    from tokenizers import Tokenizer  # slow to import, and not needed by all
+
 
 NAME = "text_encoder"
 WIDTH, HEADS, LAYERS = 384, 12, 6
@@ -34,7 +38,7 @@ class TextEncoder(NamedTuple):
     vocabulary.
     """
 
-    tokenizer: object
+    tokenizer: "Tokenizer"
     words: Packed
     positions: np.ndarray  # (MAXIMUM_TOKENS, 384), the token type's row added
     norm: tuple[np.ndarray, np.ndarray]
@@ -66,7 +70,8 @@ class TextEncoder(NamedTuple):
         return np.concatenate(rows)
 
     def _tokens(self, text: str) -> list[int]:
-        first, last = (self.tokenizer.token_to_id(mark) for mark in ("[CLS]", "[SEP]"))
+        marks = (self.tokenizer.token_to_id(mark) for mark in ("[CLS]", "[SEP]"))
+        first, last = (cast(int, mark) for mark in marks)  # its vocabulary has them
         ids = self.tokenizer.encode(text, add_special_tokens=False).ids
         return [first, *ids[: MAXIMUM_TOKENS - 2], last]
 
@@ -128,7 +133,7 @@ def forward(layers: dict[str, Array], embedded: Array, mask: Array) -> Array:
     return total / jnp.linalg.norm(total, axis=-1, keepdims=True)
 
 
-def make_tokenizer(vocabulary: Sequence[str]):
+def make_tokenizer(vocabulary: Sequence[str]) -> "Tokenizer":
     """BERT's uncased word pieces over `vocabulary`, whose order gives the ids."""
     from tokenizers import Tokenizer, models, normalizers, pre_tokenizers
 

@@ -44,7 +44,7 @@ def sample_karras(
     growth = min(1.0 + churn / steps, MOST_GROWTH)
 
     def churned(noisy: Array, sigma: Array, index: Array | int) -> tuple[Array, Array]:
-        if not churn:
+        if not churn or key is None:
             return noisy, sigma
         drawn = jax.random.normal(jax.random.fold_in(key, index), noisy.shape, noisy.dtype)
         return noisy + math.sqrt(growth**2 - 1.0) * sigma * drawn, growth * sigma

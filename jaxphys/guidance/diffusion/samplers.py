@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from jaxphys.core.errors import InputError
-from jaxphys.guidance.diffusion.schedule import Estimate, Schedule
+from jaxphys.guidance.diffusion.schedule import Estimate, Schedule, SignalAndNoise
 
 Denoise = Callable[[Array, Array], Array]
 """(noisy (B, ...), time (B,)) -> estimate of the clean sample (B, ...)."""
@@ -37,7 +37,7 @@ def _as_batch(time: Array, noisy: Array) -> Array:
 
 def sample_ddim(
     estimate: EstimateAt,
-    schedule: Schedule,
+    schedule: SignalAndNoise,
     noisy: Array,
     times: Array,
     reached: Array,
@@ -62,7 +62,7 @@ def sample_ddim(
         alpha, sigma = (s.astype(noisy.dtype) for s in schedule.alpha_sigma(now))
         alpha_next, sigma_next = (s.astype(noisy.dtype) for s in schedule.alpha_sigma(later))
         clean, noise = estimate(noisy, _as_batch(now, noisy))
-        if eta:
+        if eta and key is not None:
             kept = jnp.maximum(1.0 - (alpha / alpha_next) ** 2, 0.0)
             fresh = jnp.minimum(eta * sigma_next / sigma * jnp.sqrt(kept), sigma_next)
             drawn = jax.random.normal(jax.random.fold_in(key, index), noisy.shape, noisy.dtype)
@@ -74,7 +74,7 @@ def sample_ddim(
     return lax.scan(step, noisy, (times, reached, jnp.arange(len(times))))[0]
 
 
-def sample_heun(denoise: Denoise, schedule: Schedule, noisy: Array, times: Array) -> Array:
+def sample_heun(denoise: Denoise, schedule: SignalAndNoise, noisy: Array, times: Array) -> Array:
     """Second-order deterministic sampler (Karras et al. 2022, algorithm 1) in x / alpha.
 
     noisy: (B, ...) sample at `times[0]` (in the variance-preserving scaling). The last interval,

@@ -5,7 +5,7 @@ Kingma & Gao 2023 and Karras et al. 2022 (EDM) give the common view that is used
 """
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Protocol
 
 import jax.numpy as jnp
 from jax import Array
@@ -42,6 +42,13 @@ class Schedule:
         return jnp.arctan(ratio * self.shift) * (2.0 / jnp.pi)
 
 
+class SignalAndNoise(Protocol):
+    """Any schedule, continuous or discrete."""
+
+    def alpha_sigma(self, time: Array) -> tuple[Array, Array]:
+        """Signal and noise scale at `time` in [0, 1]; same shape as `time`."""
+
+
 class Estimate(NamedTuple):
     """What a network believes of a noisy sample; both of the sample's shape."""
 
@@ -54,20 +61,20 @@ def expand(scale: Array, like: Array) -> Array:
     return scale.reshape(scale.shape + (1,) * (like.ndim - scale.ndim)).astype(like.dtype)
 
 
-def add_noise(schedule: Schedule, clean: Array, noise: Array, time: Array) -> Array:
+def add_noise(schedule: SignalAndNoise, clean: Array, noise: Array, time: Array) -> Array:
     """x_t = alpha x + sigma eps for (B, ...) samples and (B,) times."""
     alpha, sigma = schedule.alpha_sigma(time)
     return expand(alpha, clean) * clean + expand(sigma, clean) * noise
 
 
-def velocity(schedule: Schedule, clean: Array, noise: Array, time: Array) -> Array:
+def velocity(schedule: SignalAndNoise, clean: Array, noise: Array, time: Array) -> Array:
     """v = alpha eps - sigma x (Salimans & Ho 2022, appendix D)."""
     alpha, sigma = schedule.alpha_sigma(time)
     return expand(alpha, clean) * noise - expand(sigma, clean) * clean
 
 
 def interpret(
-    schedule: Schedule,
+    schedule: SignalAndNoise,
     kind: Kind,
     prediction: Array,
     noisy: Array,

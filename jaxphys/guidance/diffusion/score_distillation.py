@@ -5,11 +5,10 @@ move by `w(t) (noise_seen - noise_added)`, without differentiating the prior.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
-from flax import nnx
 from jax import Array, lax
 
 from jaxphys.core.errors import InputError, nearest
@@ -81,6 +80,16 @@ def weight_of(kind: Weight, alpha: Array, sigma: Array) -> Array:
     return jnp.ones_like(alpha)
 
 
+class Prior(Protocol):
+    """A network that denoises at `schedule`; what it predicts is `config.kind`, a `Kind`."""
+
+    config: Any
+    schedule: Any
+
+    def __call__(self, noisy: Array, time: Array, condition: Any, /) -> Array:
+        """Predicts it for `noisy` (B, ...) at `time` (B,) in [0, 1]."""
+
+
 def draw_time(key: Array, count: int, config: DistillationConfig, progress: Array | float) -> Array:
     """(B,) noise levels, one in each equal part of the range that `progress` in [0, 1] leaves."""
     lowest, start, end = config.time
@@ -91,7 +100,7 @@ def draw_time(key: Array, count: int, config: DistillationConfig, progress: Arra
 
 
 def guided_estimate(
-    prior: nnx.Module,
+    prior: Prior,
     noisy: Array,
     time: Array,
     condition: Any,
@@ -113,7 +122,7 @@ def guided_estimate(
 
 
 def score_distillation(
-    prior: nnx.Module,
+    prior: Prior,
     samples: Array,
     condition: Any,
     unconditional: Any,

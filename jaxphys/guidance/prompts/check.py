@@ -46,7 +46,9 @@ def mended(answer: str, prompt: str) -> str:
     text = OPENING.sub("", answer.strip().strip("`\"' \n"))
     text = re.sub(r"(?:^|\n)\s*(?:[-*•]|\d+[.)])?\s*", ", ", text)
     text = "".join(character if character.isprintable() else " " for character in text)
-    kept, said, asked = [], set(), set(words_of(prompt))
+    kept: list[str] = []
+    said: set[str] = set()
+    asked = set(words_of(prompt))
     for part in re.split(r"[,;.]", text):
         part = _trimmed(without_background(part)[0] or ("" if kept else part))
         words = set(words_of(part)) - LOOSE_ENDS

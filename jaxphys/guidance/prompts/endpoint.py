@@ -153,9 +153,9 @@ class Endpoint:
             outcome["problem"] = f"answered with status {error.status_code}"
         except Unanswered as error:
             outcome["problem"] = str(error)
-        except (openai.APITimeoutError, *_transport_errors("TimeoutException"), TimeoutError):
+        except _timeouts():
             outcome["problem"] = self._late
-        except (openai.OpenAIError, *_transport_errors("HTTPError"), OSError) as error:
+        except _failures() as error:
             # Its text may hold anything that was sent; its kind says enough.
             outcome["problem"] = f"cannot be reached ({type(error).__name__})"
         except Exception as error:
@@ -171,6 +171,18 @@ class Endpoint:
                 if monotonic() > self._end:
                     raise Unanswered(self._late)
         return reply
+
+
+def _timeouts() -> tuple[type[Exception], ...]:
+    import openai
+
+    return (openai.APITimeoutError, *_transport_errors("TimeoutException"), TimeoutError)
+
+
+def _failures() -> tuple[type[Exception], ...]:
+    import openai
+
+    return (openai.OpenAIError, *_transport_errors("HTTPError"), OSError)
 
 
 def _transport_errors(name: str) -> tuple[type[Exception], ...]:

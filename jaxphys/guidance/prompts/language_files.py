@@ -123,8 +123,9 @@ def _language_files(
     template: Any,
     source: str,
 ) -> LanguageFiles:
-    marks = [tokenizer.token_to_id(mark) for mark in (TURN, END_OF_TURN)]
-    if None in marks or (isinstance(template, str) and TURN not in template):
+    found = [tokenizer.token_to_id(mark) for mark in (TURN, END_OF_TURN)]
+    marks = [mark for mark in found if mark is not None]
+    if len(marks) < len(found) or (isinstance(template, str) and TURN not in template):
         raise InputError(
             f"{source}: is not made for conversations in the ChatML form ({TURN} ... {END_OF_TURN})"
         )

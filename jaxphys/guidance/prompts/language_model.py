@@ -9,7 +9,7 @@ compiled and little is read that holds nothing.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple, Self, cast
 
 import jax
 import jax.numpy as jnp
@@ -87,7 +87,7 @@ def _compiled(
     leaves, structure = jax.tree.flatten(state)
 
     def merged(leaves: list[Array], *arguments):
-        return call(nnx.merge(graph, structure.unflatten(leaves)), *arguments)
+        return call(nnx.merge(graph, jax.tree.unflatten(structure, leaves)), *arguments)
 
     return jax.jit(merged, donate_argnums=donate), leaves
 
@@ -172,8 +172,9 @@ class LanguageModel:
         """Token ids of the turns in the ChatML form, up to where the assistant's answer goes on
         after `begin`.
         """
-        turn, end = (self._tokenizer.token_to_id(mark) for mark in (TURN, END_OF_TURN))
-        ids = []
+        marks = (self._tokenizer.token_to_id(mark) for mark in (TURN, END_OF_TURN))
+        turn, end = (cast(int, mark) for mark in marks)  # `LanguageFiles` has both
+        ids: list[int] = []
         for role, content in messages:
             ids += [turn, *self._ids(f"{role}\n{content}"), end, *self._ids("\n")]
         return [*ids, turn, *self._ids(f"assistant\n{begin}")]
@@ -239,10 +240,11 @@ class LanguageModel:
                 f" {self.config.max_position_embeddings} that the model reads"
             )
         texts = [self._read(text, longest) for text in ids]
-        options = (sampling.temperature, sampling.plausible, sampling.guidance)
-        options = tuple(np.asarray(option, self._dtype) for option in options)
+        numbers = (sampling.temperature, sampling.plausible, sampling.guidance)
+        options = tuple(np.asarray(number, self._dtype) for number in numbers)
         key, bias = jax.random.key(sampling.seed), self._bias(only)
-        written, answer = [], ""
+        written: list[int] = []
+        answer = ""
         for index in range(max_tokens):
             hidden = tuple(text.hidden for text in texts)
             token = int(self._draw(self._outside, hidden, bias, options, key, index))

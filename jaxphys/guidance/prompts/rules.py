@@ -83,7 +83,7 @@ def without_background(text: str) -> tuple[str, bool]:
 def _reduced(text: str) -> str:
     """The subject and at most a handful of traits of a long description, filler dropped."""
     clauses = re.split(r"[,;.]|\b(?:and|with|which|that|while)\b", text)
-    traits = []
+    traits: list[str] = []
     for clause in clauses:
         words = [word for word in re.findall(r"[\w'-]+", clause) if word.lower() not in FILLER]
         trait = " ".join(words[:5])

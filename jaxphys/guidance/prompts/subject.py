@@ -62,7 +62,8 @@ def _name(words: list[str]) -> Subject | None:
     start = 0
     while start < len(words) and (lower[start] in LEADING or _measures(lower, start)):
         start += 1
-    phrase, nouns = [], []
+    phrase: list[str] = []
+    nouns: list[str] = []
     for i in range(start, len(words)):
         word, following = lower[i], lower[i + 1 : i + 2]
         if word in TRAILING or (i > start and _does_something(word, following)):
@@ -76,10 +77,10 @@ def _name(words: list[str]) -> Subject | None:
             phrase.append(words[i])
     while phrase and phrase[-1] in ("of", "and"):
         phrase.pop()
-    nouns = tuple(dict.fromkeys(noun.lower() for noun in [*nouns, *phrase[-1:]]))
-    if not nouns or not NO_NAMES.isdisjoint([*nouns, phrase[0].lower()]):
+    named = tuple(dict.fromkeys(noun.lower() for noun in [*nouns, *phrase[-1:]]))
+    if not named or not NO_NAMES.isdisjoint([*named, phrase[0].lower()]):
         return None  # "something sweet" names nothing
-    return Subject(" ".join(phrase), nouns)
+    return Subject(" ".join(phrase), named)
 
 
 def _measures(lower: list[str], i: int) -> bool:

@@ -7,7 +7,6 @@ Points are given and taken in our frame, except where Point-E's is named.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +20,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.guidance.diffusion.discrete_schedule import DiscreteSchedule
 from jaxphys.guidance.diffusion.karras import DenoiseAtSigma, discrete_denoiser, sample_karras
 from jaxphys.guidance.diffusion.samplers import karras_ratios
-from jaxphys.guidance.diffusion.schedule import guided
+from jaxphys.guidance.diffusion.schedule import Kind, guided
 from jaxphys.guidance.diffusion.score_distillation import (
     Distillation,
     DistillationConfig,
@@ -65,7 +64,7 @@ class PointEPriorConfig:
     """What the networks predict, the points that the base judges or draws at a time, and those that
     the upsampler adds at a time."""
 
-    kind: str = "noise"
+    kind: Kind = "noise"
     points: int = 1024
     added: int = 3072
 
@@ -194,7 +193,7 @@ def sample_point_e(
     return from_point_e_frame(jnp.concatenate(clouds, axis=1))
 
 
-@partial(nnx.jit, static_argnames="config")
+@nnx.jit(static_argnames="config")
 def _draw(prior: PointE, text: Array, key: Array, config: PointESampling) -> Array:
     """Clouds (B, points, 6) of the base in Point-E's frame."""
     noise_key, churn_key = jax.random.split(key)
@@ -205,7 +204,7 @@ def _draw(prior: PointE, text: Array, key: Array, config: PointESampling) -> Arr
     return unscaled(sample_karras(denoise, noise, sigmas, key=churn_key, churn=config.churn))
 
 
-@partial(nnx.jit, static_argnames="config")
+@nnx.jit(static_argnames="config")
 def _add(prior: PointE, coarse: Array, key: Array, config: PointESampling) -> Array:
     """Points (B, added, 6) for coarse clouds, all in Point-E's frame."""
     noise = jax.random.normal(key, (coarse.shape[0], prior.config.added, CHANNELS), coarse.dtype)
@@ -227,11 +226,13 @@ def base_denoiser(prior: PointE, text: Array, guidance: float) -> DenoiseAtSigma
 
 def upsampler_denoiser(prior: PointE, coarse: Array) -> DenoiseAtSigma:
     """The upsampler told coarse clouds (B, M, 6) in Point-E's frame, for `sample_karras`."""
-    dtype = prior.upsampler.output_proj.kernel[...].dtype
+    upsampler = prior.upsampler
+    assert upsampler is not None  # `sample_point_e` asks for its file
+    dtype = upsampler.output_proj.kernel[...].dtype
 
     def predict(noisy: Array, time: Array) -> Array:
         step = UPSAMPLER_SCHEDULE.index(time)
-        prediction = prior.upsampler(noisy.astype(dtype), step, coarse)
+        prediction = upsampler(noisy.astype(dtype), step, coarse)
         return prediction[..., :CHANNELS].astype(noisy.dtype)
 
     return discrete_denoiser(UPSAMPLER_SCHEDULE, predict)

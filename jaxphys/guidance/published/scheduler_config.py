@@ -154,12 +154,12 @@ class SchedulerConfig:
             raise InputError(f"steps = {steps}: the schedule has 1 to {count}")
         stride = count // steps
         if self.timestep_spacing == "leading":
-            asked = np.arange(steps)[::-1] * stride + self.steps_offset
+            places: np.ndarray = np.arange(steps)[::-1] * stride + self.steps_offset
         elif self.timestep_spacing == "trailing":
-            asked = np.round(count - np.arange(steps) * (count / steps)) - 1
+            places = np.round(count - np.arange(steps) * (count / steps)) - 1
         else:
-            asked = np.round(np.linspace(0, count - 1, steps))[::-1]
-        asked = np.minimum(asked, count - 1).astype(int)
+            places = np.round(np.linspace(0, count - 1, steps))[::-1]
+        asked = np.minimum(places, count - 1).astype(int)
         if sampler == "ddpm":
             return asked, np.append(asked[1:], CLEAN)
         reached = asked - stride

@@ -7,7 +7,7 @@ once the prompt is encoded), the denoiser and the encoder of pictures; painting 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -227,7 +227,7 @@ def stable_diffusion_guide(
         InputError: as `load_prior`.
     """
     states = encode_texts(folder, [*(f"{prompt}, {view}" for view in VIEWS), negative])
-    options = {"dtype": dtype, "attention_slice": attention_slice}
+    options: dict[str, Any] = {"dtype": dtype, "attention_slice": attention_slice}
     return StableDiffusionGuide(
         load_prior(folder, **options), load_encoder(folder, **options), states
     )

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -88,7 +89,8 @@ def sample_latents(
 
     def estimate(noisy: Array, time: Array) -> Estimate:
         prediction = prior(jnp.tile(noisy, (2, 1, 1, 1)), jnp.tile(time, 2), both)
-        prediction = guided(*jnp.split(prediction, 2), config.guidance)
+        with_text, without = jnp.split(prediction, 2)
+        prediction = guided(with_text, without, config.guidance)
         found = interpret(schedule, kind, prediction, noisy, time)
         return clipped(schedule, scheduler, config.sampler, found, noisy, time)
 
@@ -128,7 +130,7 @@ def paint(
     if not prompt.strip():
         raise InputError("prompt: is empty; say what to paint, for example 'a strawberry'")
     states = encode_texts(folder, [prompt, negative])
-    options = {"dtype": config.dtype, "attention_slice": config.attention_slice}
+    options: dict[str, Any] = {"dtype": config.dtype, "attention_slice": config.attention_slice}
     prior = load_prior(folder, **options)
     decoder = load_decoder(folder, **options)
     sides = [_side(prior, name, getattr(config, name)) for name in ("height", "width")]

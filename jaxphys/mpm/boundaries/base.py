@@ -6,14 +6,15 @@ differentiated, its static fields choose the code. It acts by overriding one or 
 stages of a step; a stage that it does not act in is not traced.
 """
 
-from dataclasses import dataclass, field, fields, replace
-from typing import ClassVar, Self
+from dataclasses import Field, dataclass, fields, replace
+from typing import Any, ClassVar, Self, cast
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jaxphys.core import algebra
 from jaxphys.core.errors import InputError, nearest
 from jaxphys.core.fields import (
     NON_NEGATIVE,
@@ -47,11 +48,6 @@ DURATION = NON_NEGATIVE | unit("s")
 LENGTH = POSITIVE | unit("m")
 
 
-def derived():
-    """A field that `prepared` fills."""
-    return field(default=None, kw_only=True, repr=False, metadata=DERIVED)
-
-
 @dataclass(frozen=True)
 class Setting:
     """What boundaries are prepared for.
@@ -70,14 +66,15 @@ class Setting:
 
     def in_box(self, centre: Vector, half_size: Vector) -> np.ndarray:
         """Which particles start inside a box, (N,); those on its faces do not."""
-        half_size = np.asarray(half_size) - ON_EDGE * self.grid.spacing
+        reach = np.asarray(half_size) - ON_EDGE * self.grid.spacing
         offset = np.abs(np.asarray(self.rest, np.float64) - np.asarray(centre))
-        return np.all(offset < half_size, axis=1)
+        return np.all(offset < reach, axis=1)
 
 
 class Boundary(Checked):
     """Base of all boundaries. Subclasses are frozen dataclasses and pytrees, with a `type`."""
 
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     type: ClassVar[str]
 
     def prepared(self, setting: Setting) -> Self:
@@ -117,8 +114,8 @@ class Boundary(Checked):
                     "the scene with another one to change it"
                 )
             if not isinstance(value, jax.core.Tracer):
-                plain = np.asarray(value, np.float64)
-                plain = tuple(plain.tolist()) if plain.ndim else float(plain)
+                known = np.asarray(value, np.float64)
+                plain = tuple(known.tolist()) if known.ndim else float(known)
                 check_value(name, plain, numbers[name].metadata)
             arrays[name] = jnp.asarray(value, now.dtype)
             if arrays[name].shape != now.shape:
@@ -191,7 +188,12 @@ class Boundary(Checked):
         raise NotImplementedError
 
 
-def active(time: Array, start: Array, end: Array) -> Array:
+def array_of(value: Vector | float | Array | None) -> Array:
+    """A number of a prepared boundary: declared as plain one or derived, it is an array by now."""
+    return cast(Array, value)
+
+
+def active(time: Array, start: Array | float, end: Array | float) -> Array:
     """Whether start <= time < end, shape ()."""
     return (time >= start) & (time < end)
 
@@ -201,9 +203,9 @@ def column(vector: Array, like) -> Array:
     return vector.reshape(3, *(1,) * jnp.ndim(like[0]))
 
 
-def height(x, point: Array, normal: Array) -> Array:
+def height(x, point: Array | Vector, normal: Array) -> Array:
     """Distance of places x, (3, ...) or three arrays that broadcast, along a unit normal [m]."""
-    return sum(normal[i] * (x[i] - point[i]) for i in range(3))
+    return algebra.total(normal[i] * (x[i] - point[i]) for i in range(3))
 
 
 def unit_vector(vector: Array) -> Array:

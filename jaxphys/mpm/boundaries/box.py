@@ -18,6 +18,7 @@ from jaxphys.mpm.boundaries.base import (
     VELOCITY,
     Vector,
     active,
+    array_of,
     column,
 )
 from jaxphys.mpm.boundaries.contact import FAR, Contact, Face, Surface
@@ -54,10 +55,10 @@ class Box(Contact):
         return ((self.surface, self.friction is not None),)
 
     def faces(self, x, time: Array) -> tuple[Face, ...]:
-        moved = self.velocity * jnp.clip(time - self.start, 0, self.end - self.start)
-        velocity = jnp.where(active(time, self.start, self.end), self.velocity, 0)
+        moved = array_of(self.velocity) * jnp.clip(time - self.start, 0, self.end - self.start)
+        velocity = jnp.where(active(time, self.start, self.end), array_of(self.velocity), 0)
         offset = [x[i] - self.centre[i] - moved[i] for i in range(3)]
-        distance, normal = box_distance(offset, self.half_size)
+        distance, normal = box_distance(offset, array_of(self.half_size))
         distance = jnp.where(active(time, self.start, self.end + self.rest_after), distance, FAR)
         return (Face(distance, normal, column(velocity, x), self.friction, self.surface),)
 

@@ -17,7 +17,7 @@ On the grid, nodes inside of the solid lose their velocity: firm, but to within 
 
 from abc import abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple, Self
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -27,12 +27,13 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.fields import one_of
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries.base import (
+    DERIVED,
     ON_EDGE,
     STATIC,
     Boundary,
     Coordinates,
     Setting,
-    derived,
+    array_of,
 )
 from jaxphys.mpm.elasticity import lame
 from jaxphys.mpm.grid import Grid
@@ -43,6 +44,7 @@ ActsOn = Literal["particles", "nodes"]
 
 STIFFNESS = 2.0
 DEEPEST = 0.5  # cells that a particle may start inside of a solid
+_FRICTIONLESS: dict[str, Any] = {"friction": None}  # a field of every subclass
 FAR = 1e6  # how far away [m] is what does not act
 
 
@@ -57,7 +59,7 @@ class Face(NamedTuple):
     distance: Array
     normal: Array
     velocity: Array
-    friction: Array | None
+    friction: Array | float | None
     surface: Surface
 
     @property
@@ -76,8 +78,14 @@ class Contact(Boundary):
         radius: of the particles [m], (N,).
     """
 
+    place: ClassVar[str]  # the field that an object inside of it should be told to change
     acts_on: ActsOn | None = field(default=None, kw_only=True, metadata=STATIC | one_of(ActsOn))
-    radius: Array | None = derived()
+    radius: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
+
+    @property
+    @abstractmethod
+    def friction(self) -> float | None:
+        """Coulomb's coefficient, the same for all faces unless they have their own."""
 
     @abstractmethod
     def faces(self, x, time: Array) -> tuple[Face, ...]:
@@ -108,7 +116,7 @@ class Contact(Boundary):
         made = super().prepared(setting)
         # Friction of zero is none: its code is left out, and it cannot be differentiated.
         if not self.friction:
-            made = replace(made, friction=None)
+            made = replace(made, **_FRICTIONLESS)
         if not made.at_particles:
             return made
         made = replace(made, radius=jnp.asarray(0.5 * np.cbrt(setting.volume), setting.dtype))
@@ -144,7 +152,7 @@ class Contact(Boundary):
                 # `slip` is as the step before left it; the particle has moved by dt v since.
                 moved = slip[first : first + 3] + dt * (velocity - face.velocity)
                 first += 3
-            pressed, moved = deflection(face, self.radius, moved)
+            pressed, moved = deflection(face, array_of(self.radius), moved)
             total = total + pressed * face.normal
             if moved is not None:
                 total = total - moved
@@ -184,7 +192,7 @@ def _strained(face: Face, x: Array, radius: Array, pressed: Array, slip: Array) 
     slip = slip - face.normal * jnp.sum(face.normal * slip, axis=0)
     if face.surface == "sticky":
         return jnp.where(x > -2 * radius, slip, 0)
-    return shortened(slip, face.friction * jnp.abs(pressed))
+    return shortened(slip, array_of(face.friction) * jnp.abs(pressed))
 
 
 def shortened(vector: Array, longest: Array) -> Array:

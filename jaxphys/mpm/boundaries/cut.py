@@ -16,6 +16,7 @@ from jaxphys.mpm.boundaries.base import (
     Boundary,
     Vector,
     active,
+    array_of,
     column,
     height,
     unit_vector,
@@ -48,7 +49,7 @@ class Cut(Boundary):
 
     def on_grid(self, velocity, coordinates, grid, time, dt):
         edge = ON_EDGE * grid.spacing
-        normal = unit_vector(self.normal)
+        normal = unit_vector(array_of(self.normal))
         inside = height(coordinates, self.point, normal) < -edge
         layer = (coordinates[2] > self.lower + edge) & (coordinates[2] < self.upper - edge)
         n = column(normal, coordinates)

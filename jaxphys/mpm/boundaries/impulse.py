@@ -9,6 +9,7 @@ from jax import Array
 
 from jaxphys.core.fields import POSITIVE, between, unit, vector
 from jaxphys.mpm.boundaries.base import (
+    DERIVED,
     HALF_SIZE,
     PLACE,
     STATIC,
@@ -17,7 +18,7 @@ from jaxphys.mpm.boundaries.base import (
     Setting,
     Vector,
     active,
-    derived,
+    array_of,
 )
 
 
@@ -45,7 +46,7 @@ class Impulse(Boundary):
     start: float = field(default=0.0, metadata=TIME)
     duration: float = field(default=1e-3, metadata=POSITIVE | unit("s"))
     per_particle: bool = field(default=False, metadata=STATIC)
-    chosen: Array | None = derived()
+    chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
 
     def prepared(self, setting: Setting) -> Self:
         chosen = setting.in_box(self.centre, self.half_size)
@@ -53,8 +54,8 @@ class Impulse(Boundary):
         return replace(made, force=made.force * chosen.sum()) if self.per_particle else made
 
     def impulse(self, position, velocity, slip, model, grid, time, dt):
-        mass = jnp.where(self.chosen, model.mass, 0)
+        mass = jnp.where(array_of(self.chosen), model.mass, 0)
         total = jnp.sum(mass)
         acts = active(time, self.start, self.start + self.duration)
         share = jnp.where(acts, mass, 0) / jnp.where(total > 0, total, 1)
-        return dt * self.force[:, None] * share, None
+        return dt * array_of(self.force)[:, None] * share, None

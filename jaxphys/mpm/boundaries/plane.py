@@ -17,6 +17,7 @@ from jaxphys.mpm.boundaries.base import (
     VELOCITY,
     Vector,
     active,
+    array_of,
     column,
     height,
     unit_vector,
@@ -54,15 +55,16 @@ class Plane(Contact):
         return ((self.surface, self.friction is not None),)
 
     def faces(self, x, time: Array) -> tuple[Face, ...]:
-        normal = unit_vector(self.normal)
-        point = self.point + self.velocity * jnp.maximum(time - self.start, 0)
+        normal = unit_vector(array_of(self.normal))
+        velocity = array_of(self.velocity)
+        point = array_of(self.point) + velocity * jnp.maximum(time - self.start, 0)
         acts = active(time, self.start, self.end)
         distance = jnp.where(acts, height(x, point, normal), FAR)
         return (
             Face(
                 distance,
                 column(normal, x),
-                column(self.velocity, x),
+                column(velocity, x),
                 self.friction,
                 self.surface,
             ),

@@ -10,12 +10,13 @@ from jax import Array
 
 from jaxphys.core.fields import between, unit
 from jaxphys.mpm.boundaries.base import (
+    DERIVED,
     DIRECTION,
     TIME,
     Boundary,
     Setting,
     Vector,
-    derived,
+    array_of,
 )
 
 
@@ -40,7 +41,7 @@ class Release(Boundary):
     finish: float = field(metadata=between(-1e6, 1e6) | unit("m"))
     start: float = field(default=0.0, metadata=TIME)
     end: float = field(default=1.0, metadata=TIME)
-    places: Array | None = derived()
+    places: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
 
     def prepared(self, setting: Setting) -> Self:
         normal = np.asarray(self.normal, np.float64)
@@ -52,8 +53,9 @@ class Release(Boundary):
         plane = self.begin + share * (self.finish - self.begin)
         # A sweep downwards is one upwards along the reverse of the normal.
         sign = jnp.where(self.finish >= self.begin, 1, -1)
-        ahead = sign * (self.places - plane)
-        ahead_of_all = sign * (self.places - self.begin)
-        beyond = sign * (self.places - self.finish)
+        places = array_of(self.places)
+        ahead = sign * (places - plane)
+        ahead_of_all = sign * (places - self.begin)
+        beyond = sign * (places - self.finish)
         held = (ahead > 0) & (ahead_of_all >= 0) & (beyond <= 0)
         return jnp.where(held & (time < self.end), 0, velocity)

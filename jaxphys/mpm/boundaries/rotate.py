@@ -10,6 +10,7 @@ from jax import Array
 
 from jaxphys.core.fields import between, unit
 from jaxphys.mpm.boundaries.base import (
+    DERIVED,
     DIRECTION,
     FOREVER,
     LENGTH,
@@ -20,7 +21,7 @@ from jaxphys.mpm.boundaries.base import (
     Setting,
     Vector,
     active,
-    derived,
+    array_of,
     unit_vector,
 )
 
@@ -49,7 +50,7 @@ class Rotate(Boundary):
     axial_velocity: float = field(default=0.0, metadata=between(-1e8, 1e8) | unit("m/s"))
     start: float = field(default=0.0, metadata=TIME)
     end: float = field(default=FOREVER, metadata=TIME)
-    chosen: Array | None = derived()
+    chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
 
     def prepared(self, setting: Setting) -> Self:
         axis = np.asarray(self.axis, np.float64)
@@ -61,7 +62,9 @@ class Rotate(Boundary):
         return replace(super().prepared(setting), chosen=jnp.asarray(chosen))
 
     def on_particles(self, position, velocity, time, dt):
-        axis = unit_vector(self.axis)
-        turning = jnp.cross(axis, (position - self.point[:, None]).T).T
+        axis = unit_vector(array_of(self.axis))
+        turning = jnp.cross(axis, (position - array_of(self.point)[:, None]).T).T
         motion = self.angular_velocity * turning + (self.axial_velocity * axis)[:, None]
-        return jnp.where(self.chosen & active(time, self.start, self.end), motion, velocity)
+        return jnp.where(
+            array_of(self.chosen) & active(time, self.start, self.end), motion, velocity
+        )

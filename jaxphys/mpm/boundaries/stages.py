@@ -52,7 +52,9 @@ def impulses(
     """Momentum (3, N) [kg m/s] that the boundaries add to what particles give to the grid, None if
     none does, and the new `State.slip`.
     """
-    total, kept, first = None, [], 0
+    total: Array | None = None
+    kept: list[Array] = []
+    first = 0
     for name, boundary in acting(model.boundaries, "impulse"):
         rows = boundary.rows
         if rows and (slip is None or slip.shape[0] < first + rows):
@@ -60,11 +62,11 @@ def impulses(
                 f"State.slip has no room for {type(boundary).__name__}, which has friction; give "
                 "initial_state(..., boundaries=model.boundaries)."
             )
-        own = slip[first : first + rows] if rows else None
+        own = slip[first : first + rows] if rows and slip is not None else None
         with part(name):
             given, own = boundary.impulse(position, velocity, own, model, grid, time, dt)
             total = given if total is None else total + given
-        if rows:
+        if rows and own is not None:
             kept.append(own)
             first += rows
     return total, jnp.concatenate(kept) if kept else slip

@@ -1,14 +1,14 @@
 """The six sides of the domain."""
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.core.fields import NON_NEGATIVE, one_of, unit
-from jaxphys.mpm.boundaries.base import STATIC, Setting, column, derived
+from jaxphys.mpm.boundaries.base import DERIVED, STATIC, Setting, array_of, column
 from jaxphys.mpm.boundaries.contact import Contact, Face, Surface
 
 Side = Literal["sticky", "slip", "separate", "open"]
@@ -39,25 +39,25 @@ class Walls(Contact):
     inset: float | None = field(default=None, metadata=NON_NEGATIVE | unit("m"))
     surfaces: Sides | None = field(default=None, metadata=STATIC | one_of(Side) | {"count": 6})
     frictions: Frictions | None = field(default=None, metadata=NON_NEGATIVE | {"count": 6})
-    size: Array | None = derived()
+    size: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
 
     def prepared(self, setting: Setting) -> Self:
         grid = setting.grid
         inset = CELLS * grid.spacing if self.inset is None else self.inset
         size = [(n - 1) * grid.spacing for n in grid.shape]
-        frictions = self.frictions
-        if frictions is not None:
-            frictions = tuple(jnp.asarray(f, setting.dtype) if f else None for f in frictions)
+        frictions: Any = None  # declared as numbers, and then arrays, or None where zero
+        if self.frictions is not None:
+            frictions = tuple(jnp.asarray(f, setting.dtype) if f else None for f in self.frictions)
         made = replace(self, inset=inset, size=jnp.asarray(size, setting.dtype), frictions=None)
         return replace(Contact.prepared(made, setting), frictions=frictions)
 
     @property
-    def _sides(self) -> tuple[tuple[int, int, Side, Array | None], ...]:
+    def _sides(self) -> tuple[tuple[int, int, Surface, float | None], ...]:
         """(axis, which, surface, friction) of each face; which: -1 lower, 1 upper, 0 both as one,
         since no particle touches both.
         """
         surfaces = self.surfaces or (self.surface,) * 6
-        sides = []
+        sides: list[tuple[int, int, Side, float | None]] = []
         for axis in range(3):
             lower, upper = surfaces[2 * axis : 2 * axis + 2]
             if lower == upper and self.frictions is None:
@@ -66,18 +66,23 @@ class Walls(Contact):
             frictions = self.frictions or (self.friction,) * 6
             sides.append((axis, -1, lower, frictions[2 * axis]))
             sides.append((axis, 1, upper, frictions[2 * axis + 1]))
-        return tuple(side for side in sides if side[2] != "open")
+        return tuple(
+            (axis, which, surface, friction)
+            for axis, which, surface, friction in sides
+            if surface != "open"
+        )
 
     @property
     def kinds(self):
         return tuple((surface, friction is not None) for _, _, surface, friction in self._sides)
 
     def faces(self, x, time: Array) -> tuple[Face, ...]:
-        still = column(jnp.zeros_like(self.size), x)
+        size, inset = array_of(self.size), array_of(self.inset)
+        still = column(jnp.zeros_like(size), x)
         faces = []
         for axis, which, surface, friction in self._sides:
-            along = x[axis] - 0.5 * self.size[axis]
-            reach = 0.5 * self.size[axis] - self.inset
+            along = x[axis] - 0.5 * size[axis]
+            reach = 0.5 * size[axis] - inset
             sign = -jnp.sign(along) if which == 0 else jnp.asarray(-which, along.dtype)
             distance = reach + sign * along if which else reach - jnp.abs(along)
             normal = jnp.stack([sign if a == axis else jnp.zeros_like(sign) for a in range(3)])
