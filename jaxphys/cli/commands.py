@@ -157,7 +157,8 @@ def animate(
     """Move an object as its material would.
 
     Args:
-        source: Splats (.ply), a mesh (.obj, .glb), or a directory made by generate.
+        source: Splats (.ply), a mesh (.obj, .glb), a directory made by generate, or the folder of a
+            trained model (point_cloud/iteration_N/point_cloud.ply, cameras.json).
         out: Directory for everything that is made: new, empty, or of an earlier run.
         material: What it is made of; `jaxphys materials` lists them. Default: jelly.
         config: Scene file, ours or PhysGaussian's, in place of the material's own scene.

@@ -10,6 +10,7 @@ from jaxphys.core.reading import reading
 from jaxphys.mpm.materials import get_material
 from jaxphys.scene.build import validate
 from jaxphys.scene.defaults import default_scene
+from jaxphys.scene.model_folder import is_trained, splats_in
 from jaxphys.scene.read import read_scene
 from jaxphys.scene.scene import Scene
 
@@ -24,18 +25,20 @@ def scene_for(
     """The scene of a file or of a material, with the given fields changed where they are not None.
 
     Prints the notes of an imported file on standard error. Without file and material, the
-    config.json of a directory given as `source` counts, then jelly.
+    config.json of a directory of `generate` given as `source` counts, then jelly.
 
     Raises:
         InputError: an unknown material, a bad file or a value out of range.
     """
     if config is None and material is None and source is not None and source.is_dir():
         config = source / "config.json"
+        if is_trained(source) and not config.exists():
+            config = None
     if base is not None:
         scene = base
     elif config is not None:
         with reading(config):
-            loaded = read_scene(config)
+            loaded = read_scene(config, source)
             validate(loaded.scene)
         scene = loaded.scene
         for note in loaded.notes:
@@ -78,11 +81,12 @@ def with_source(
     beside = config.parent if config is not None else None
     if source is not None:
         if source.is_dir():
-            source = source / "gaussians.ply"
+            source = splats_in(source)
         first = dataclasses.replace(first, source=str(source.absolute()))
     elif first.source is None and required:
         raise InputError(
-            "OBJECT: name splats (.ply), a mesh (.obj, .glb) or a directory of generate"
+            "OBJECT: name splats (.ply), a mesh (.obj, .glb), a directory of generate or the "
+            "folder of a trained model"
         )
     if splats is not None:
         try:

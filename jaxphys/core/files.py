@@ -99,8 +99,8 @@ def output_file(
     return path
 
 
-def read_json(path: str | os.PathLike, largest: int = LARGEST_JSON) -> dict[str, Any]:
-    """The object in a JSON file.
+def read_json(path: str | os.PathLike, largest: int = LARGEST_JSON, kind: type = dict) -> Any:
+    """The object in a JSON file, or with `kind` = list the list.
 
     What JSON does not know (NaN, infinities) or no number type here holds (1e999, whole numbers of
     more than `MOST_DIGITS` digits) is refused.
@@ -124,8 +124,9 @@ def read_json(path: str | os.PathLike, largest: int = LARGEST_JSON) -> dict[str,
             ) from None
         except RecursionError:
             raise InputError("is nested too deeply") from None
-        if not isinstance(value, dict):
-            raise InputError(f"expected an object {{ ... }}, found {shown(value)}")
+        if not isinstance(value, kind):
+            wanted = "a list [ ... ]" if kind is list else "an object { ... }"
+            raise InputError(f"expected {wanted}, found {shown(value)}")
         return value
 
 

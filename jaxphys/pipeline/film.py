@@ -21,7 +21,7 @@ from jaxphys.pipeline.video import ContactSheet, VideoWriter
 from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import next_capacity, required_pairs
 from jaxphys.scene.look import Look
-from jaxphys.scene.scene import Scene, View
+from jaxphys.scene.scene import Scene
 
 ROOM = 1.15  # capacity over what the frames looked at need
 
@@ -88,11 +88,6 @@ def _needed(look: Look, frame: Frame, camera: Camera) -> Array:
     return required_pairs(frame_splats(look, frame, position(camera)), camera)
 
 
-def needs_whole_motion(view: View) -> bool:
-    """Whether the camera can only be placed once the whole motion is known."""
-    return view.distance is None or view.target is None
-
-
 class Artist:
     """Draws frames of one scene; compiles once, and again only where a frame needs more room.
 
@@ -100,7 +95,7 @@ class Artist:
         scene: size of the pictures, camera and surroundings.
         look: what is drawn.
         frames: those that the camera must show and that room is made for: all of them, or where the
-            camera stands by itself (`needs_whole_motion`) the first one.
+            camera stands by itself (`View.stands_by_itself`) the first one.
         timing: gets the seconds of compiling.
     """
 
@@ -111,9 +106,11 @@ class Artist:
         low, high = shown[0].min(axis=0), shown[0].max(axis=0)
         if look.still is not None:
             shown[0] = np.concatenate([shown[0], np.asarray(look.still.means)])
-        if not needs_whole_motion(scene.camera):
+        if scene.camera.stands_by_itself:
             shown = shown[:1] * scene.frames
-        self.cameras = frame_cameras(scene.camera, shown, scene.fps, scene.width, scene.height)
+        self.cameras = frame_cameras(
+            scene.camera, shown, scene.fps, scene.width, scene.height, look.placements[0]
+        )
         self._middle = jnp.asarray((low + high)[:2] / 2)
         self._extent = jnp.asarray(max(1.2 * float(np.max(high - low)), 1e-3), shown[0].dtype)
         self._programs: dict[int, Callable] = {}
@@ -175,7 +172,7 @@ def film(
     Raises:
         KeyboardInterrupt: a stop was asked for, here or by what gives the frames.
     """
-    if needs_whole_motion(scene.camera):
+    if not scene.camera.stands_by_itself:
         frames = list(frames)
     sheet, artist = ContactSheet(scene.frames), None
     bar = tqdm(total=scene.frames, desc="render", unit="frame", disable=not progress)

@@ -27,4 +27,5 @@ from .scene import Object as Object
 from .scene import Region as Region
 from .scene import Rotation as Rotation
 from .scene import Scene as Scene
-from .scene import View as View
+from .view import Photograph as Photograph
+from .view import View as View

@@ -10,12 +10,13 @@ import numpy as np
 from jaxphys.gaussians.colour import ColourRange, colour_range, to_unit_interval
 from jaxphys.gaussians.gaussians import Gaussians, concatenate
 from jaxphys.scene.place import Placed
+from jaxphys.scene.placement import Placement
 
 
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=("gaussians", "still", "colours"),
-    meta_fields=("counts", "lone"),
+    meta_fields=("counts", "lone", "placements"),
 )
 @dataclass(frozen=True)
 class Look:
@@ -28,13 +29,15 @@ class Look:
         colours: the range of colours of each object, None where they are left as they are.
         counts: moving Gaussians of each object.
         lone: Gaussians beside each object that were left out, since nothing would hold them to it.
+        placements: where the contents of each object's file are, for cameras that stood there.
     """
 
     gaussians: Gaussians
     still: Gaussians | None
     colours: tuple[ColourRange, ...] | None
     counts: tuple[int, ...]
-    lone: tuple[int, ...] = ()
+    lone: tuple[int, ...]
+    placements: tuple[Placement, ...]
 
     @property
     def objects(self) -> tuple[tuple[int, int], ...]:
@@ -53,4 +56,5 @@ def look_of(placed: tuple[Placed, ...], regularise_colours: bool) -> Look:
         colours=ranges if regularise_colours else None,
         counts=tuple(one.moving.count for one in placed),
         lone=tuple(one.lone for one in placed),
+        placements=tuple(one.placement for one in placed),
     )

@@ -16,8 +16,10 @@ from jaxphys.core.dataclass_reader import from_json
 from jaxphys.core.errors import InputError, nearest, one_line, shown
 from jaxphys.mpm.boundaries import Vector
 from jaxphys.mpm.plasticity import UNIAXIAL
+from jaxphys.scene.model_folder import FiledCamera
+from jaxphys.scene.physgaussian_camera import seen_from
 from jaxphys.scene.physgaussian_config import Config, ParticleFilling
-from jaxphys.scene.scene import Domain, Filling, Object, Region, Rotation, Scene, View
+from jaxphys.scene.scene import Domain, Filling, Object, Region, Rotation, Scene
 
 KEYS = {entry.name for entry in dataclasses.fields(Config)}
 AXES: tuple[Vector, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -110,8 +112,6 @@ def _filling(
     if filling.max_particles_per_cell is not None:
         per_cell = filling.max_particles_per_cell
         notes.append("particle_filling.max_particles_per_cell: ignored by PhysGaussian, taken here")
-    if filling.visualize:
-        notes.append("particle_filling.visualize: filled particles are not drawn; left out")
     notes.append(
         "particle_filling: an enormous Gaussian is bounded here, where theirs loops without end"
     )
@@ -126,28 +126,7 @@ def _filling(
         area=area,
         smooth=filling.smooth,
         relax=False,
-    )
-
-
-def _camera(config: Config, notes: list[str]) -> View:
-    if config.default_camera_index >= 0:
-        notes.append("default_camera_index: cameras.json is not read; the camera frames the motion")
-    if config.init_radius is not None or config.delta_r is not None:
-        notes.append(
-            "init_radius, delta_r: in the splat file's units there; the camera frames the motion"
-        )
-    if config.mpm_space_vertical_upward_axis != AXES[2]:
-        notes.append("mpm_space_vertical_upward_axis: z is up here; left out")
-    if config.show_hint:
-        notes.append("show_hint: left out")
-    moves = 1 / config.frame_dt if config.move_camera else 0.0
-    return View(
-        # Their horizontal axes are (1, 1, 0) and its normal: azimuth 0 looks from 45 degrees.
-        azimuth=config.init_azimuthm + 45.0,
-        elevation=config.init_elevation,
-        target=config.mpm_space_viewpoint_center,
-        turn=moves * config.delta_a,
-        rise=moves * config.delta_e,
+        show=filling.visualize,
     )
 
 
@@ -158,22 +137,29 @@ def _gravity(config: Config, notes: list[str]) -> Vector:
     return config.g
 
 
-def from_physgaussian(value: Any, where: str = "config") -> Imported:
+def from_physgaussian(
+    value: Any, where: str = "config", cameras: tuple[FiledCamera, ...] | None = None
+) -> Imported:
     """Our scene for a decoded PhysGaussian configuration.
+
+    Args:
+        value: what `json` made.
+        where: the file, for errors.
+        cameras: of the model's photographs; None: not known.
 
     Raises:
         InputError: an unknown key, a wrong type or a number out of range, naming the field.
     """
     config, notes = from_json(Config, value, where), []
     try:
-        return Imported(_scene(config, notes), tuple(dict.fromkeys(notes)))
+        return Imported(_scene(config, cameras, notes), tuple(dict.fromkeys(notes)))
     except InputError as error:
         if str(error).startswith(one_line(where)):
             raise
         raise InputError(f"{where}.{error}") from None
 
 
-def _scene(config: Config, notes: list[str]) -> Scene:
+def _scene(config: Config, cameras: tuple[FiledCamera, ...] | None, notes: list[str]) -> Scene:
     name = config.material
     if name not in MATERIALS:
         raise InputError(f"material: unknown material {shown(name)}; {nearest(name, MATERIALS)}")
@@ -191,10 +177,15 @@ def _scene(config: Config, notes: list[str]) -> Scene:
     if abs(steps - round(steps)) > 1e-6 * steps:
         notes.append(f"substep_dt: theirs runs {int(steps)} whole steps a frame; here time adds up")
     notes.append("bounds: leaving the grid or losing finiteness stops the run with an error here")
-    if material != "jelly":
+    # Theirs always follow the elastic part. Of grains it is all that makes sense; metal that stays
+    # bent would show it in its splats' places but not in their shapes.
+    follow = "elastic" if material == "sand" else "total"
+    if material == "metal":
         notes.append(
             "rendering: splats follow the total deformation here, theirs its elastic part only"
         )
+    fps = min(max(round(1 / frame_time), 1), 1000)
+    view, width, height = seen_from(config, fps, cameras, notes)
     thing = Object(
         material=material,
         parameters=_parameters(config, material, notes),
@@ -213,8 +204,11 @@ def _scene(config: Config, notes: list[str]) -> Scene:
         domain=domain,
         damping=-math.log(min(config.grid_v_damping_scale, 1.0)) / substep + 0.0,
         frames=config.frame_num,
-        fps=min(max(round(1 / frame_time), 1), 1000),
+        fps=fps,
         frame_time=frame_time,
         substep=substep,
-        camera=_camera(config, notes),
+        camera=view,
+        width=width,
+        height=height,
+        splats_follow=follow,
     )

@@ -6,7 +6,7 @@ Fields are named as the keys. None stands for a key that is absent.
 
 from dataclasses import dataclass, field
 
-from jaxphys.core.fields import DURATION, LENGTH, PLACE, between
+from jaxphys.core.fields import DURATION, LENGTH, PLACE, between, direction
 from jaxphys.scene.physgaussian_boundaries import Condition
 
 Vector = tuple[float, float, float]
@@ -85,7 +85,7 @@ class Config:
     particle_filling: ParticleFilling | None = None
     # The camera.
     mpm_space_viewpoint_center: Vector = field(default=(1.0, 1.0, 1.0), metadata=PLACE)
-    mpm_space_vertical_upward_axis: Vector = field(default=(0.0, 0.0, 1.0), metadata=PLACE)
+    mpm_space_vertical_upward_axis: Vector = field(default=(0.0, 0.0, 1.0), metadata=direction())
     default_camera_index: int = field(default=0, metadata=between(-1, 1_000_000))
     show_hint: bool = field(default=False, metadata=FLAG)
     init_azimuthm: float = 0.0

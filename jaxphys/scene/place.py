@@ -24,6 +24,7 @@ from jaxphys.gaussians.lone import lone_points
 from jaxphys.gaussians.relax import blue_noise
 from jaxphys.gaussians.volumes import cell_volumes
 from jaxphys.mpm.grid import Grid
+from jaxphys.scene.placement import Placement
 from jaxphys.scene.scene import Object
 
 RELAX_STEPS = 40
@@ -47,6 +48,7 @@ class Placed(NamedTuple):
         filling: further particles inside, (M, 3) [m].
         volumes: of the particles [m^3], (K + M,), those of Gaussians first.
         lone: number of splats beside the object that were left out.
+        placement: where the contents of the object's file are in the domain.
     """
 
     moving: Gaussians
@@ -54,6 +56,7 @@ class Placed(NamedTuple):
     filling: np.ndarray
     volumes: np.ndarray
     lone: int
+    placement: Placement
 
 
 def rotation_matrix(thing: Object, where: str) -> np.ndarray:
@@ -91,7 +94,8 @@ def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str, seed: int
             f"{where}.opacity_threshold: none of {gaussians.count} Gaussians has an opacity of "
             f"{thing.opacity_threshold} or more; lower it"
         )
-    gaussians = transform(select(gaussians, np.flatnonzero(visible)), rotation_matrix(thing, where))
+    rotation = rotation_matrix(thing, where)
+    gaussians = transform(select(gaussians, np.flatnonzero(visible)), rotation)
     means = np.asarray(gaussians.means, np.float64)
     chosen = np.ones(len(means), bool)
     if thing.area is not None:
@@ -115,7 +119,8 @@ def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str, seed: int
         moving, filling = concatenate([moving, _shown(filling, moving, thing, grid)]), filling[:0]
     moving, still = (transform(part, translation=centre) for part in (moving, still))
     filling = (filling + centre).astype(moving.means.dtype)
-    return Placed(moving, still, filling, volumes, int(np.sum(chosen & ~kept)))
+    placement = Placement.of(rotation, scale, middle, centre)
+    return Placed(moving, still, filling, volumes, int(np.sum(chosen & ~kept)), placement)
 
 
 def _frame(means: np.ndarray, size: float) -> tuple[np.ndarray, float]:

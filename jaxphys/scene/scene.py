@@ -19,11 +19,10 @@ from jaxphys.core.fields import (
     between,
 )
 from jaxphys.mpm.boundaries import AnyBoundary, Vector
+from jaxphys.scene.view import ANGLE, RATE, View
 
 Area = tuple[float, float, float, float, float, float]
 
-ANGLE = between(-1e6, 1e6)
-RATE = between(-1e6, 1e6)
 MOST_SPLATS = 20_000_000
 MOST_NODES = 512**3
 
@@ -162,30 +161,6 @@ class Domain(Checked):
         # Round-off must not add a cell to a side that is a multiple of the spacing.
         x, y, z = (math.ceil(side / self.spacing - 1e-6) + 1 for side in self.size)
         return x, y, z
-
-
-@dataclass(frozen=True)
-class View(Checked):
-    """The camera: it looks at `target` from `distance`, and may move.
-
-    Attributes:
-        azimuth: degrees about z, 0 looks from +x, 90 from +y.
-        elevation: degrees above the horizon.
-        distance: to the target [m]; null: so that the whole motion is in the picture.
-        target: [m]; null: the middle of the motion.
-        field_of_view: horizontal, degrees.
-        turn, rise: change of azimuth and elevation [degrees/s].
-        approach: change of distance [m/s].
-    """
-
-    azimuth: float = field(default=-60.0, metadata=ANGLE)
-    elevation: float = field(default=14.0, metadata=between(-89.9, 89.9))
-    distance: float | None = field(default=None, metadata=LENGTH)
-    target: Vector | None = field(default=None, metadata=PLACE)
-    field_of_view: float = field(default=35.0, metadata=between(1.0, 150.0))
-    turn: float = field(default=0.0, metadata=RATE)
-    rise: float = field(default=0.0, metadata=RATE)
-    approach: float = field(default=0.0, metadata=SPEED)
 
 
 @dataclass(frozen=True)

@@ -6,17 +6,22 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.reading import reading
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.gaussians.ply import read_ply
+from jaxphys.scene.model_folder import splats_in
 from jaxphys.scene.scene import Object
 
 MESHES = (".obj", ".glb", ".gltf", ".stl", ".off")
 
 
 def find(source: str, beside: Path | None) -> Path:
-    """The path of a source: as it stands, or relative to the directory of the scene's file."""
+    """The path of a source: as it stands, or relative to the directory of the scene's file.
+
+    Raises:
+        InputError: a folder without splats.
+    """
     path = Path(source)
     if beside is not None and not path.is_absolute() and (beside / path).exists():
         path = beside / path
-    return path / "gaussians.ply" if path.is_dir() else path
+    return splats_in(path) if path.is_dir() else path
 
 
 def load_object(thing: Object, beside: Path | None, seed: int, where: str) -> Gaussians:
@@ -31,10 +36,10 @@ def load_object(thing: Object, beside: Path | None, seed: int, where: str) -> Ga
 
 
 def load(path: str | Path, *, count: int = 20_000, seed: int = 0) -> Gaussians:
-    """The Gaussians of a .ply file of splats, of a directory of `generate`, or of a mesh.
+    """The Gaussians of a .ply file of splats, of a folder of them, or of a mesh.
 
     Args:
-        path: the file.
+        path: the file; or a folder of `generate`, or of a trained model (see `splats_in`).
         count: Gaussians that a mesh becomes.
         seed: of the random points on a mesh.
 
@@ -43,7 +48,7 @@ def load(path: str | Path, *, count: int = 20_000, seed: int = 0) -> Gaussians:
     """
     path = Path(path)
     if path.is_dir():
-        path = path / "gaussians.ply"
+        path = splats_in(path)
     suffix = path.suffix.lower()
     if not path.exists():
         raise InputError(f"{path}: no such file")

@@ -1,9 +1,13 @@
 import json
 import math
 
+import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
+from jaxphys.mpm.boundaries import Setting
+from jaxphys.mpm.grid import Grid
 from jaxphys.scene import Box, Impulse, Plane, Release, Rotate, Translate, Walls, read_scene
 from jaxphys.scene.physgaussian import from_physgaussian
 
@@ -87,12 +91,13 @@ def test_ficus_loads_with_its_meaning_and_notes():
     assert (scene.frames, scene.fps, scene.frame_time) == (125, 25, 0.04)
     # One substep's factor applied for a second.
     assert scene.damping == pytest.approx(-math.log(0.9999) / 1e-4)
-    assert scene.camera.azimuth == 55 and scene.camera.turn == pytest.approx(0.5 / 0.04)
+    assert scene.camera.azimuth == pytest.approx(35)
+    assert scene.camera.turn == pytest.approx(-0.5 / 0.04)
     assert scene.boundaries[0].rest_after == pytest.approx(15e-4)
     assert scene.boundaries[1].duration == pytest.approx(1e-4)
     assert scene.boundaries[1].per_particle
     text = "\n".join(notes)
-    for word in ("cuboid reset", "particle_impulse", "particle_filling", "init_radius", "bounds"):
+    for word in ("cuboid reset", "particle_impulse", "particle_filling", "cameras.json", "bounds"):
         assert word in text
 
 
@@ -103,6 +108,32 @@ def test_walls_and_surfaces_hold_the_nodes_that_theirs_hold():
     assert scene.domain.shape == (50, 50, 50)
     assert [boundary.acts_on for boundary in scene.boundaries] == ["nodes", "nodes"]
     assert scene.boundaries[0].inset is None  # three cells
+
+
+def test_nodes_that_walls_and_a_floor_on_a_node_hold():
+    """Nodes 0 to 2 and n - 3 to n - 1, and below the floor strictly: theirs stops dot < 0."""
+    conditions = [
+        ALL[0][0],
+        ALL[4][0] | {"surface": "sticky", "friction": 0, "point": [0, 0, 0.48]},
+    ]
+    config = {"g": [0, 0, 0], "grid_lim": 1, "n_grid": 25, "boundary_conditions": conditions}
+    scene = from_physgaussian(config).scene
+    grid = Grid(scene.domain.shape, scene.domain.spacing)
+    assert 0.48 / grid.spacing == pytest.approx(12)
+    rest = np.full((1, 3), 0.6)
+    walls, floor = (
+        one.prepared(Setting(grid, rest, np.ones(1), np.float32)) for one in scene.boundaries
+    )
+    nodes = np.arange(25, dtype=np.float32) * np.float32(grid.spacing)
+    where = (nodes[:, None, None], nodes[None, :, None], nodes[None, None, :])
+    for sign in (-1, 1):
+        moved = jnp.full((3, 25, 25, 25), float(sign))
+        left = np.asarray(walls.on_grid(moved, where, grid, 0.0, 1e-3))
+        for axis in range(3):
+            line = np.moveaxis(left[axis], axis, -1)[12, 12]
+            assert list(np.flatnonzero(line == 0)) == ([0, 1, 2] if sign < 0 else [22, 23, 24])
+    held = np.asarray(floor.on_grid(jnp.ones((3, 25, 25, 25)), where, grid, 0.0, 1e-3))
+    assert list(np.flatnonzero(held[0, 12, 12] == 0)) == list(range(12))
 
 
 def test_rotation_turns_the_way_of_theirs():
