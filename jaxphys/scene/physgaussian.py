@@ -10,7 +10,7 @@ the difference.
 import dataclasses
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from jaxphys.core.dataclass_reader import from_json
 from jaxphys.core.errors import InputError, nearest, one_line, shown
@@ -150,7 +150,8 @@ def from_physgaussian(
     Raises:
         InputError: an unknown key, a wrong type or a number out of range, naming the field.
     """
-    config, notes = from_json(Config, value, where), []
+    config = from_json(Config, value, where)
+    notes: list[str] = []
     try:
         return Imported(_scene(config, cameras, notes), tuple(dict.fromkeys(notes)))
     except InputError as error:
@@ -179,7 +180,7 @@ def _scene(config: Config, cameras: tuple[FiledCamera, ...] | None, notes: list[
     notes.append("bounds: leaving the grid or losing finiteness stops the run with an error here")
     # Theirs always follow the elastic part. Of grains it is all that makes sense; metal that stays
     # bent would show it in its splats' places but not in their shapes.
-    follow = "elastic" if material == "sand" else "total"
+    follow: Literal["elastic", "total"] = "elastic" if material == "sand" else "total"
     if material == "metal":
         notes.append(
             "rendering: splats follow the total deformation here, theirs its elastic part only"

@@ -19,6 +19,7 @@ from jaxphys.mpm.boundaries import (
     Translate,
     Walls,
 )
+from jaxphys.mpm.boundaries.contact import Surface
 
 Vector = tuple[float, float, float]
 FLAG = {"zero_or_one": True}
@@ -118,7 +119,8 @@ class SurfaceCollider:
             notes.append(
                 f"surface_collider {self.surface}: theirs sticks whatever it says; not so here"
             )
-        kind = self.surface if self.surface in ("sticky", "slip") else "separate"
+        kinds: dict[str, Surface] = {"sticky": "sticky", "slip": "slip"}
+        kind = kinds.get(self.surface, "separate")
         return Plane(self.point, self.normal, kind, self.friction, start, end, acts_on="nodes")
 
 

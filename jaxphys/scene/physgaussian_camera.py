@@ -44,10 +44,10 @@ def seen_from(
         )
     camera = cameras[max(index, 0)]
     shrunk = min(1.0, LARGEST / max(camera.width, camera.height))
-    size = (max(8, round(shrunk * side)) for side in (camera.width, camera.height))
+    width, height = (max(8, round(shrunk * side)) for side in (camera.width, camera.height))
     if index >= 0:
-        return View(photograph=camera.photograph), *size
-    return _orbit(config, fps, camera), *size
+        return View(photograph=camera.photograph), width, height
+    return _orbit(config, fps, camera), width, height
 
 
 def _orbit(config: Config, fps: float, lens: FiledCamera | None) -> View:
@@ -65,11 +65,11 @@ def _orbit(config: Config, fps: float, lens: FiledCamera | None) -> View:
         up=config.mpm_space_vertical_upward_axis,
         units="source",
     )
-    changes = {"azimuth": _first_axis(view) - config.init_azimuthm}
-    if lens is not None:
-        angle = math.degrees(2 * math.atan(lens.width / (2 * lens.fx)))
-        changes["field_of_view"] = min(max(angle, 1.0), 150.0)
-    return dataclasses.replace(view, **changes)
+    view = dataclasses.replace(view, azimuth=_first_axis(view) - config.init_azimuthm)
+    if lens is None:
+        return view
+    angle = math.degrees(2 * math.atan(lens.width / (2 * lens.fx)))
+    return dataclasses.replace(view, field_of_view=min(max(angle, 1.0), 150.0))
 
 
 def _first_axis(view: View) -> float:

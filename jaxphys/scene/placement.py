@@ -9,6 +9,11 @@ from jaxphys.mpm.boundaries import Vector
 Matrix = tuple[Vector, Vector, Vector]
 
 
+def _vector(values) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
 class Placement(NamedTuple):
     """Where the contents of a file are: x in the file is at scale (rotation x - middle) + centre.
 
@@ -29,8 +34,8 @@ class Placement(NamedTuple):
     @classmethod
     def of(cls, rotation, scale, middle, centre) -> "Placement":
         """From arrays: (3, 3), (), (3,) and (3,)."""
-        rows = tuple(tuple(map(float, row)) for row in rotation)
-        return cls(rows, float(scale), tuple(map(float, middle)), tuple(map(float, centre)))
+        x, y, z = (_vector(row) for row in rotation)
+        return cls((x, y, z), float(scale), _vector(middle), _vector(centre))
 
     def point(self, x) -> np.ndarray:
         """Places (..., 3) in the file, in the domain [m]."""

@@ -1,18 +1,18 @@
 import dataclasses
 from functools import partial
 
-import jax
 import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.mpm.fracture import number_of_pieces
+from jaxphys.mpm.frames import advance_frame
 from jaxphys.mpm.materials import MATERIALS
-from jaxphys.mpm.rollout import check, rollout
+from jaxphys.mpm.rollout import check
 from jaxphys.scene import scene_from_json, to_json
 from jaxphys.scene.build import build
-from jaxphys.scene.defaults import default_scene
+from jaxphys.scene.defaults import SPACING, default_scene
 
 
 @pytest.mark.parametrize("name", MATERIALS)
@@ -50,17 +50,12 @@ def hollow_ball(count=600):
     return from_points(points.astype(np.float32), np.array([0.6, 0.6, 0.6]), size)
 
 
-@partial(jax.jit, static_argnames=("config", "steps"))
-def run(config, model, state, dt, steps):
-    return rollout(config, model, state, dt=dt, steps=steps)
-
-
 def after(name, frames, spacing=0.1):
     """Positions (N, 3) of a ball's particles in the material's scene, at the start and after some
     frames, and the fastest speed then.
     """
     simulation, _ = build(default_scene(name, spacing=spacing), hollow_ball())
-    end = run(
+    end = advance_frame(
         simulation.config,
         simulation.model,
         simulation.state,
@@ -92,7 +87,7 @@ def test_elastic_bounces_and_keeps_its_shape():
 def test_metal_keeps_its_dent():
     before, now, speed = after("metal", 24)
     assert out_of_shape(before, now) > 0.05
-    assert speed < 0.8  # of 4.8 m/s at the impact; it still rocks
+    assert speed < 1.2  # of 4.8 m/s at the impact; it still rocks
 
 
 def test_jelly_wobbles_and_comes_to_rest():
@@ -110,9 +105,9 @@ def test_sand_runs_into_a_heap():
     assert speed < 0.2
 
 
+@pytest.mark.slow
 def test_what_fractures_breaks_into_pieces():
-    """On the coarsest grid whose cells are no wider than the flaws: others part nowhere."""
-    spacing = 1 / 16
-    before, now, _ = after("fracture", 12, spacing)
-    pieces = partial(number_of_pieces, radius=1.1 * spacing, minimum_size=len(before) // 50)
+    """On the grid of the scene itself: on coarser ones what is broken parts late or nowhere."""
+    before, now, _ = after("fracture", 18, SPACING)
+    pieces = partial(number_of_pieces, radius=1.1 * SPACING, minimum_size=len(before) // 50)
     assert pieces(before) == 1 and pieces(now) >= 2
