@@ -126,6 +126,11 @@ def cell_volumes(points: np.ndarray, single: float) -> np.ndarray:
         single: width of a particle with fewer than four others [m].
     """
     points = np.asarray(points, np.float64)
+    distinct, which, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    if len(distinct) < len(points):
+        # Particles at one place share what one of them would have.
+        which = which.reshape(-1)
+        return cell_volumes(distinct, single)[which] / count[which]
     if len(points) < 5:
         return np.full(len(points), single**3)
     tree = cKDTree(points)

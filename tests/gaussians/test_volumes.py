@@ -102,6 +102,15 @@ def test_sheets_threads_and_single_particles():
     assert together.min() > 0 and np.isfinite(together).all()
 
 
+def test_particles_at_one_place_share_what_one_has():
+    lattice = np.stack(np.meshgrid(*[0.1 * np.arange(4.0)] * 3, indexing="ij"), -1).reshape(-1, 3)
+    alone = cell_volumes(lattice, 0.05)
+    twice = cell_volumes(np.concatenate([lattice, lattice[:1], lattice[:1]]), 0.05)
+    np.testing.assert_allclose(twice[1:64], alone[1:])
+    np.testing.assert_allclose(twice[[0, 64, 65]], alone[0] / 3)
+    np.testing.assert_allclose(cell_volumes(np.ones((5, 3)), 0.05), 0.05**3 / 5)
+
+
 def test_a_random_cloud_is_filled_between_its_points():
     points = np.random.default_rng(0).uniform(-1, 1, (4000, 3))
     assert cell_volumes(points, 1.0).sum() == pytest.approx(8.0, rel=0.12)

@@ -280,6 +280,11 @@ def test_an_impulse_gives_its_region_force_times_time_as_one_body(rest, mass, sp
     assert not given(Impulse((9.0,) * 3, (0.1,) * 3, (1.0, 0.0, 0.0))).any()
     each = dataclasses.replace(push, per_particle=True)
     np.testing.assert_allclose(given(each).sum(1), momentum.sum(1) * chosen.sum())
+    # Whatever the steps: in all force times duration, also of a push shorter than a step.
+    for start, duration in ((0.0, 0.003), (0.004, 0.003), (0.007, 0.02)):
+        short = dataclasses.replace(push, start=start, duration=duration)
+        total = sum(given(short, time=0.01 * step) for step in range(4))
+        np.testing.assert_allclose(total.sum(1), duration * np.array([1.0, 0, -2.0]), atol=1e-15)
 
 
 def on_particles(boundary, rest, speed, time=0.0, position=None):

@@ -17,7 +17,6 @@ from jaxphys.mpm.boundaries.base import (
     Boundary,
     Setting,
     Vector,
-    active,
     array_of,
 )
 
@@ -56,6 +55,8 @@ class Impulse(Boundary):
     def impulse(self, position, velocity, slip, model, grid, time, dt):
         mass = jnp.where(array_of(self.chosen), model.mass, 0)
         total = jnp.sum(mass)
-        acts = active(time, self.start, self.start + self.duration)
-        share = jnp.where(acts, mass, 0) / jnp.where(total > 0, total, 1)
-        return dt * array_of(self.force)[:, None] * share, None
+        # Of the step only what lies within: a push shorter than a step is no stronger for it.
+        end = jnp.minimum(time + dt, self.start + self.duration)
+        lasts = jnp.clip(end - jnp.maximum(time, self.start), 0, dt)
+        share = mass / jnp.where(total > 0, total, 1)
+        return lasts * array_of(self.force)[:, None] * share, None
