@@ -69,9 +69,13 @@ def _jelly(domain: Domain) -> Scene:
         size=SIZE,
         centre=_above(0.15, SIZE),
         velocity=(0.0, 0.0, -1.0),
+        # Upright, something that is narrow below would begin to fall over where the film ends.
+        rotation=(Rotation((0.0, 1.0, 0.0), 35.0),),
+        # A skin that is stretched shows its inside between its splats.
+        filling=Filling(show=True),
     )
     # Elastic laws do not tire: without damping it would bounce on for longer than the film.
-    return _scene(thing, domain, friction=0.6, damping=2.0)
+    return _scene(thing, domain, friction=0.6, damping=2.5)
 
 
 def _metal(domain: Domain) -> Scene:

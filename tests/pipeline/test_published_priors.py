@@ -113,7 +113,7 @@ def test_image_command_paints(tmp_path):
         (["--out", "x.jpg"], "must end in .png"),
         (["--out", "x.png", "--width", "17"], "multiple of 2"),
         (["--out", "x.png", "--steps", "2000"], "1 to 1000"),
-        (["--out", "x.png", "--steps", "0"], "at least one"),
+        (["--out", "x.png", "--steps", "0"], "at least 1"),
     ],
 )
 def test_image_command_refuses(tmp_path, capsys, monkeypatch, more, said):

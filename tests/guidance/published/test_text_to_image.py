@@ -158,5 +158,5 @@ def test_steps_that_do_not_divide_the_schedule():
 def test_unusable_settings_are_refused():
     with pytest.raises(InputError, match="ddim"):
         PaintConfig(sampler="dimm")
-    with pytest.raises(InputError, match="at least one"):
+    with pytest.raises(InputError, match="at least 1"):
         PaintConfig(steps=0)
