@@ -11,6 +11,7 @@ from jaxphys.core.splats import Splats
 from jaxphys.gaussians.colour import regularise
 from jaxphys.gaussians.gaussians import Gaussians, concatenate, to_splats
 from jaxphys.mpm.motion import Frame
+from jaxphys.mpm.state import OK
 from jaxphys.pipeline.deform import bake, deform
 from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import Image, render
@@ -73,7 +74,7 @@ def draw(
     splats = frame_splats(look, frame, position(camera))
     image = render(splats, camera, background=background, settings=settings, capacity=capacity)
     # What is not a number is not drawn: without this a failure would be an empty picture.
-    sound = jnp.where(frame.status.code == 0, 1, jnp.nan).astype(image.colour.dtype)
+    sound = jnp.where(frame.status.code == OK, 1, jnp.nan).astype(image.colour.dtype)
     return image._replace(colour=image.colour * sound)
 
 
