@@ -1,7 +1,8 @@
 """Suite 'mpm': a block of random particles, eight per cell, in a fixed grid.
 
 Our side and the peer in `benchmarks/peers/taichi_mpm.py` get the same particles in the same
-(sorted) order. Work is counted in particle-steps.
+(sorted) order. Both have all cores: ours as one device each, in chunks and with a window of the
+grid, as a run has them. Work is counted in particle-steps.
 """
 
 import time
@@ -19,9 +20,9 @@ LAWS = {
     "sand": ("plasticity.DRUCKER_PRAGER", {"friction_angle": 35.0}),
 }
 PEER_LAWS = ("neo-Hookean", "fixed corotated")
-# case: (cells a side of the block, nodes a side of the grid, steps in a call)
-SIZES = {"64k": (20, 64, 10), "262k": (32, 128, 4)}
-QUICK_SIZES = {"8k": (10, 32, 10)}
+# case: (cells a side of the block, nodes a side of the grid, steps in a call: about a frame)
+SIZES = {"64k": (20, 64, 30), "262k": (32, 128, 20)}
+QUICK_SIZES = {"8k": (10, 32, 30)}
 
 
 def block_case(cells: int, nodes: int, law: str = "neo-Hookean", seed: int = 0) -> dict:
@@ -31,7 +32,7 @@ def block_case(cells: int, nodes: int, law: str = "neo-Hookean", seed: int = 0) 
     at half its largest stable step. Positions (N, 3) [m] and velocities (N, 3) [m/s] are numpy.
     """
     from jaxphys.mpm.grid import Grid
-    from jaxphys.mpm.sorting import cell_order
+    from jaxphys.mpm.loop.sorting import cell_order
 
     random = np.random.default_rng(seed)
     spacing, count = 1.0 / nodes, 8 * cells**3
@@ -54,12 +55,23 @@ def block_case(cells: int, nodes: int, law: str = "neo-Hookean", seed: int = 0) 
     }
 
 
-def model_and_state(case: dict, window: int | None = None):
-    """(config, model, state) of a `block_case` in float32; window: nodes per axis, None for all."""
+def start_devices(number: int | None = None) -> None:
+    """Makes JAX, not yet started, take each core for a device, or `number` devices."""
+    import jax
+
+    from jaxphys.cli.devices import cores
+
+    jax.config.update("jax_num_cpu_devices", number or cores())
+
+
+def model_and_state(case: dict, devices: int | None = None):
+    """(config, model, state) of a `block_case` in float32, on all devices or `devices` of them."""
     import jax.numpy as jnp
 
     from jaxphys.mpm import elasticity, plasticity
     from jaxphys.mpm.grid import Grid
+    from jaxphys.mpm.loop.placement import suited
+    from jaxphys.mpm.loop.window import windowed
     from jaxphys.mpm.state import Config, Model, initial_state
 
     count = len(case["position"])
@@ -67,7 +79,7 @@ def model_and_state(case: dict, window: int | None = None):
     module, attribute = name.split(".")
     law = getattr({"elasticity": elasticity, "plasticity": plasticity}[module], attribute)
     grid = Grid((case["nodes"],) * 3, case["spacing"])
-    config = Config(grid, ((law, 0, count),), window=None if window is None else (window,) * 3)
+    config = Config(grid, ((law, 0, count),), placement=suited(count, devices))
 
     def full(name):
         return jnp.full(count, {**case, **more}[name], jnp.float32)
@@ -79,29 +91,29 @@ def model_and_state(case: dict, window: int | None = None):
         gravity=jnp.array([0.0, 0.0, -9.8], jnp.float32),
     )
     state = initial_state(config, case["position"], case["velocity"], dtype=jnp.float32)
-    return config, model, state
+    return windowed(config, state), model, state
 
 
-def forward(case: dict, steps: int, window: int | None = None):
+def forward(case: dict, steps: int, devices: int | None = None):
     """A compiled `() -> State` that runs `steps` steps from the case's start."""
     import jax
 
-    from jaxphys.mpm.rollout import rollout
+    from jaxphys.mpm.loop.rollout import rollout
 
-    config, model, state = model_and_state(case, window)
+    config, model, state = model_and_state(case, devices)
     run = jax.jit(partial(rollout, config, dt=case["dt"], steps=steps))
     return partial(run, model, state)
 
 
-def value_and_gradient(case: dict, steps: int, adjoint=None, window: int | None = None):
+def value_and_gradient(case: dict, steps: int, adjoint=None, devices: int | None = None):
     """A compiled `() -> (value, gradient)` of the mean square position by Young's modulus."""
     import jax
     import jax.numpy as jnp
 
-    from jaxphys.mpm.adjoint import Checkpointed
-    from jaxphys.mpm.rollout import rollout
+    from jaxphys.mpm.loop.adjoint import Checkpointed
+    from jaxphys.mpm.loop.rollout import rollout
 
-    config, model, state = model_and_state(case, window)
+    config, model, state = model_and_state(case, devices)
 
     def loss(modulus, model, state):
         parameters = {**model.parameters, "youngs_modulus": modulus}
@@ -126,6 +138,7 @@ def prepare(law: str, cells: int, nodes: int, steps: int) -> Prepared:
     """Our solver, `steps` steps a call."""
     import jax
 
+    start_devices()
     run = forward(block_case(cells, nodes, law), steps)
     return Prepared(
         lambda: jax.block_until_ready(run()),

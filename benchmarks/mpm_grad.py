@@ -9,7 +9,7 @@ and is left out where that takes more memory than `PEER_BYTES`.
 from functools import partial
 
 from benchmarks.case import Case, Prepared
-from benchmarks.mpm import block_case, compiled, forward, value_and_gradient
+from benchmarks.mpm import block_case, compiled, forward, start_devices, value_and_gradient
 from benchmarks.peers.taichi_mpm_grad import build, field_bytes
 
 # case: (cells a side of the block, nodes a side of the grid, steps)
@@ -31,6 +31,7 @@ def prepare(program, cells: int, nodes: int, steps: int) -> Prepared:
     """`program(case, steps)` gives what is timed."""
     import jax
 
+    start_devices()
     run = program(block_case(cells, nodes), steps)
     return Prepared(
         lambda: jax.block_until_ready(run()),

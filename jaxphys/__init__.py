@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .core.errors import InputError as InputError
     from .gaussians.gaussians import Gaussians as Gaussians
-    from .mpm.adjoint import Checkpointed as Checkpointed
-    from .mpm.adjoint import Plain as Plain
-    from .mpm.frames import rollout_frames as rollout_frames
+    from .mpm.loop.adjoint import Checkpointed as Checkpointed
+    from .mpm.loop.adjoint import Plain as Plain
+    from .mpm.loop.frames import rollout_frames as rollout_frames
+    from .mpm.loop.status import SimulationError as SimulationError
     from .mpm.motion import Frame as Frame
     from .mpm.motion import Motion as Motion
-    from .mpm.rollout import SimulationError as SimulationError
     from .mpm.simulation import Simulation as Simulation
     from .pipeline.animate import animate as animate
     from .pipeline.draw import draw as draw
@@ -37,12 +37,12 @@ if TYPE_CHECKING:
 _HOMES = {
     "InputError": "core.errors",
     "Gaussians": "gaussians.gaussians",
-    "Checkpointed": "mpm.adjoint",
-    "Plain": "mpm.adjoint",
-    "rollout_frames": "mpm.frames",
+    "Checkpointed": "mpm.loop.adjoint",
+    "Plain": "mpm.loop.adjoint",
+    "rollout_frames": "mpm.loop.frames",
     "Frame": "mpm.motion",
     "Motion": "mpm.motion",
-    "SimulationError": "mpm.rollout",
+    "SimulationError": "mpm.loop.status",
     "Simulation": "mpm.simulation",
     "animate": "pipeline.animate",
     "draw": "pipeline.draw",

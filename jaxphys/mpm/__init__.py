@@ -1,22 +1,23 @@
 """MLS-MPM: laws, materials, boundaries, the step, rollouts and their gradients."""
 
-from .adjoint import Checkpointed as Checkpointed
-from .adjoint import Plain as Plain
 from .fracture import number_of_pieces as number_of_pieces
-from .frames import advance_frame as advance_frame
-from .frames import rollout_frames as rollout_frames
 from .grid import Grid as Grid
 from .law import Law as Law
+from .loop.adjoint import Checkpointed as Checkpointed
+from .loop.adjoint import Plain as Plain
+from .loop.frames import advance_frame as advance_frame
+from .loop.frames import rollout_frames as rollout_frames
+from .loop.placement import Placement as Placement
+from .loop.sorting import cell_order as cell_order
+from .loop.sorting import inverse_order as inverse_order
+from .loop.status import SimulationError as SimulationError
+from .loop.status import check as check
 from .materials import MATERIALS as MATERIALS
 from .materials import Material as Material
 from .materials import get_material as get_material
 from .motion import Frame as Frame
 from .motion import Motion as Motion
-from .rollout import SimulationError as SimulationError
-from .rollout import check as check
 from .simulation import Simulation as Simulation
-from .sorting import cell_order as cell_order
-from .sorting import inverse_order as inverse_order
 from .state import Config as Config
 from .state import Model as Model
 from .state import State as State

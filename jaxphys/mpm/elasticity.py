@@ -10,20 +10,32 @@ from jaxphys.core.spectral import left_isotropic, left_strain, polar_rotation, v
 from jaxphys.mpm.law import Law, Parameters
 
 ELASTIC_PARAMETERS = ("youngs_modulus", "poisson_ratio")
+MODULI = ("shear_modulus", "first_lame_parameter")
 
 
 def lame(parameters: Parameters) -> tuple[Array, Array]:
     """Shear modulus mu and Lame's first parameter lambda [Pa] from `youngs_modulus` [Pa] and
-    `poisson_ratio`.
+    `poisson_ratio`, or as `with_moduli` has worked them out.
     """
+    if MODULI[0] in parameters:
+        return parameters[MODULI[0]], parameters[MODULI[1]]
     E, nu = parameters["youngs_modulus"], parameters["poisson_ratio"]
     return E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
 
 
+def with_moduli(parameters: Parameters) -> Parameters:
+    """Parameters with the moduli that `lame` gives, so that no step works them out again."""
+    if not set(ELASTIC_PARAMETERS) <= set(parameters):
+        return parameters
+    return parameters | dict(zip(MODULI, lame(parameters), strict=True))
+
+
 def add_to_diagonal(A: Array, value: Array) -> Array:
-    """A + value I for A (3, 3, ...) and value (...)."""
-    (a, b, c), (d, e, f), (g, h, i) = algebra.entries(A)
-    return algebra.stack_matrix([[a + value, b, c], [d, e + value, f], [g, h, i + value]])
+    """A + value I for A (3, 3, ...) and value (...).
+
+    Broadcast, so that XLA computes the value once; entry by entry it does so for each.
+    """
+    return A + value * algebra.identity_like(A)
 
 
 def neo_hookean_stress(parameters: Parameters, F: Array) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.rollout import check
+from jaxphys.mpm.loop.status import check
 from jaxphys.mpm.state import OK, Status
 
 

@@ -11,6 +11,8 @@ from jax import Array
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.law import Law
+from jaxphys.mpm.loop.placement import Placement
+from jaxphys.mpm.transfer.stencil import Window
 
 CODES = 8
 (
@@ -35,8 +37,10 @@ class Config:
         where a law is plastic; elsewhere the two are the same.
     window: nodes per axis of the part of the grid that is computed, or None for all of it. The
         window follows the particles; if they outgrow it, the status says so. A block of particles
-        that spans c cells needs c + 3 nodes, and room for what its motion adds.
+        that spans c cells needs c + 3 nodes, two more if it moves, and room for what its motion
+        adds.
     check_step: compare dt with what the state's stiffness allows, at the start of every rollout.
+    placement: in which chunks and on which devices particles are computed.
     """
 
     grid: Grid
@@ -44,6 +48,7 @@ class Config:
     track_total: bool = False
     window: tuple[int, int, int] | None = None
     check_step: bool = True
+    placement: Placement = Placement()
 
     def __post_init__(self):
         reached = 0
@@ -73,6 +78,21 @@ class Config:
     def nodes(self) -> tuple[int, int, int]:
         """Shape of the part of the grid that is computed."""
         return self.window or self.grid.shape
+
+    @property
+    def runs(self) -> tuple[tuple[Law, int, int], ...]:
+        """The segments, those of one law that follow each other as one."""
+        found: list[tuple[Law, int, int]] = []
+        for law, start, stop in self.segments:
+            if found and found[-1][0] == law:
+                start = found.pop()[1]
+            found.append((law, start, stop))
+        return tuple(found)
+
+    @property
+    def computed(self) -> Window:
+        """The part of the grid that is computed, for transfers."""
+        return Window(self.nodes, self.grid.spacing, self.grid.shape)
 
     @property
     def history_rows(self) -> int:
@@ -106,7 +126,7 @@ class Status(NamedTuple):
     """Whether a simulation is sound, and if not, what failed first. All scalars, int32.
 
     code: OK, or one of NOT_FINITE, LEFT_GRID, STEP_TOO_LARGE, LEFT_WINDOW, INVERTED, COLLAPSED,
-    UNSTABLE_STEP, which `rollout.check` explains; step: steps taken before the one that failed;
+    UNSTABLE_STEP, which `loop.status.check` explains; step: steps taken before the one that failed;
     particle: the lowest index that failed in it (UNSTABLE_STEP: the one that allows least); taken:
     steps taken in all. `step` and `particle` are -1 while code is OK.
     """

@@ -194,14 +194,9 @@ def contact_bound(model, grid) -> Array:
     return 2 / jnp.sqrt(sum(rates, jnp.zeros((), model.mass.dtype)))
 
 
-def hard_limits(config, model, state) -> Array:
-    """The step [s] beyond which each particle is unstable as it is now, (N,)."""
-    each = [
-        jnp.minimum(*bounds)
-        for bounds in _by_segment(config, model, present_bounds, state.deformation)
-    ]
-    limits = each[0] if len(each) == 1 else jnp.concatenate(each)
-    return jnp.minimum(limits, contact_bound(model, config.grid))
+def hard_limit(law: Law, parameters: Parameters, F: Array, density: Array, spacing: float) -> Array:
+    """The step [s] beyond which each particle is unstable as it is now, (...), contact apart."""
+    return jnp.minimum(*present_bounds(law, parameters, F, density, spacing))
 
 
 def fastest(config, model, state) -> Array:

@@ -12,7 +12,7 @@ from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.core.run_folder import RunFolder, run_folder
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.gaussians.ply import write_ply
-from jaxphys.mpm.rollout import SimulationError
+from jaxphys.mpm.loop.status import SimulationError
 from jaxphys.pipeline.draw import deformed_gaussians
 from jaxphys.pipeline.film import Artist, film
 from jaxphys.pipeline.output import Timing, write_lines

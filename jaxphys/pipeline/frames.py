@@ -6,8 +6,7 @@ Film, checkpoint, metrics and whoever comes after consume the same iterator.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import jax
@@ -16,11 +15,12 @@ import numpy as np
 from jax import Array
 
 from jaxphys.mpm.fracture import number_of_pieces
-from jaxphys.mpm.frames import advance_frame
+from jaxphys.mpm.loop.frames import advance_frame
+from jaxphys.mpm.loop.status import check
+from jaxphys.mpm.loop.window import windowed
 from jaxphys.mpm.motion import Frame, Motion, join
-from jaxphys.mpm.rollout import check
 from jaxphys.mpm.simulation import Simulation
-from jaxphys.mpm.state import OK, State
+from jaxphys.mpm.state import LEFT_WINDOW, OK, State
 from jaxphys.pipeline.output import Timing
 
 # How often a frame that fails is tried again with half the time step.
@@ -108,22 +108,30 @@ def frames(
         yield _moment(simulation, simulation.state, 0, particles)
     number, state = start
     dtype = state.position.dtype
+    config, model = simulation.config, simulation.model
+    if config.placement.devices > 1:
+        # Where the frames leave it, so that the first one is no program of its own.
+        model, state = jax.device_put((model, state), config.placement.everywhere())
 
     def arguments(refinement: int):
         steps = simulation.steps * 2**refinement
         return jnp.asarray(simulation.frame_time / steps, dtype), jnp.asarray(steps, jnp.int32)
 
-    advance = partial(advance_frame, simulation.config, simulation.model)
     with timing.stage("simulate"), timing.compiling("simulate"):
         dt, steps = arguments(0)
-        jax.block_until_ready(advance(state, dt, 0 * steps))
+        jax.block_until_ready(advance_frame(windowed(config, state), model, state, dt, 0 * steps))
     refinements = 0 if simulation.given_substep is not None else REFINEMENTS
     while True:
         number += 1
         with timing.stage("simulate"):
             before = state
+            program = windowed(config, before)
             for refinement in range(refinements + 1):
-                state = advance(before, *arguments(refinement))
+                dt, steps = arguments(refinement)
+                state = advance_frame(program, model, before, dt, steps)
+                if int(state.status.code) == LEFT_WINDOW:
+                    program = replace(config, window=None)
+                    state = advance_frame(program, model, before, dt, steps)
                 if int(state.status.code) == OK:
                     break
             check(state.status, number)

@@ -17,8 +17,10 @@ import numpy as np
 
 from jaxphys.core.program import parts
 from jaxphys.gaussians.gaussians import Gaussians, from_points, transform
+from jaxphys.mpm.loop.chunks import cuts
+from jaxphys.mpm.loop.rollout import step
+from jaxphys.mpm.loop.window import windowed
 from jaxphys.mpm.materials import MATERIALS
-from jaxphys.mpm.step import step
 from jaxphys.mpm.time_step import largest_stable_dt
 from jaxphys.pipeline.film import picture, surroundings_of
 from jaxphys.render.camera import orbit
@@ -77,7 +79,9 @@ class Plan:
     Attributes:
         included: part of the program -> why.
         left_out: part -> why.
-        particles, gaussians, grid: sizes.
+        particles, gaussians, grid: sizes; window: of the grid, the part that the first frame
+            computes.
+        devices: how many share the particles; chunk: particles computed together, at most.
         substep: time step [s]; `bounds` [s] and `reason`: what limits it.
         steps_per_frame, frames, steps: counts.
         memory: bytes by what they hold.
@@ -89,6 +93,9 @@ class Plan:
     particles: int
     gaussians: int
     grid: tuple[int, int, int]
+    window: tuple[int, int, int]
+    devices: int
+    chunk: int
     substep: float
     bounds: dict[str, float]
     reason: str
@@ -191,6 +198,8 @@ def describe(scene: Scene, built: Built) -> Plan:
     included, left_out = _facts(scene, built)
     bounds = largest_stable_dt(simulation.config, simulation.model, simulation.state)
     reason = bounds.reason if scene.substep is None else "the scene's own substep"
+    placement = simulation.config.placement
+    chunk = max(into.size for into in cuts(simulation.config.runs, placement))
     particles, drawn = simulation.config.particles, look.gaussians.count
     nodes = int(np.prod(simulation.config.grid.shape))
     steps = simulation.steps * (scene.frames - 1)
@@ -204,6 +213,9 @@ def describe(scene: Scene, built: Built) -> Plan:
         particles=particles,
         gaussians=drawn,
         grid=simulation.config.grid.shape,
+        window=windowed(simulation.config, simulation.state).nodes,
+        devices=placement.devices,
+        chunk=chunk,
         substep=simulation.dt,
         bounds=limits,
         reason=reason,
@@ -213,7 +225,7 @@ def describe(scene: Scene, built: Built) -> Plan:
         memory={
             "state and parameters": state + model,
             "grid": 16 * nodes,
-            "transfers": 27 * 16 * particles,
+            "transfers": 27 * 16 * placement.devices * chunk,
             "motion": 48 * drawn * scene.frames,
             "picture": 32 * pixels,
         },
@@ -233,9 +245,11 @@ def as_text(plan: Plan, as_json: bool = False) -> str:
     lines += [f"  {name}: {why}" for name, why in plan.included.items()]
     lines += ["left out:"]
     lines += [f"  {name}: {why}" for name, why in plan.left_out.items()]
-    grid = " x ".join(str(side) for side in plan.grid)
+    grid, window = (" x ".join(map(str, shape)) for shape in (plan.grid, plan.window))
+    part = "" if plan.window == plan.grid else f", of which {window} at a time"
     lines += [
-        f"particles: {plan.particles} ({plan.gaussians} carry Gaussians), grid {grid}",
+        f"particles: {plan.particles} ({plan.gaussians} carry Gaussians), grid {grid}{part}",
+        f"devices: {plan.devices}, particles in chunks of {plan.chunk}",
         f"time step: {plan.substep:.3e} s, limited by {plan.reason}",
         *(f"  bound {name}: {value:.3e} s" for name, value in plan.bounds.items()),
         f"steps: {plan.steps_per_frame} a frame, {plan.frames} frames, {plan.steps} in all",

@@ -20,8 +20,8 @@ from jaxphys.core import algebra
 from jaxphys.mpm.boundaries import Boundary, Plane, Setting
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.law import Law
+from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.state import Config, Model, State, initial_state
-from jaxphys.mpm.step import step
 from jaxphys.problems.kinematics import deformation_gradient, velocity
 
 

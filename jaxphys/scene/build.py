@@ -14,9 +14,10 @@ from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.mpm.boundaries import Damping, Setting, prepare
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.loop.placement import suited
+from jaxphys.mpm.loop.sorting import cell_order, inverse_order
 from jaxphys.mpm.materials import assemble_parameters, get_material, material_values, overridden
 from jaxphys.mpm.simulation import Simulation
-from jaxphys.mpm.sorting import cell_order, inverse_order
 from jaxphys.mpm.state import Config, Model, State, initial_state
 from jaxphys.mpm.substep import choose_substep
 from jaxphys.scene.look import Look, look_of
@@ -151,6 +152,7 @@ def solver_parts(
         segments,
         track_total=scene.splats_follow == "total",
         check_step=not scene.unsafe_substep,
+        placement=suited(len(arrangement)),
     )
 
     def gathered(name: str) -> np.ndarray:

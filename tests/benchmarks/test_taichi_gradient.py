@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.mpm import block_case, model_and_state
-from jaxphys.mpm.rollout import rollout
+from jaxphys.mpm.loop.rollout import rollout
 
 STEPS = 8
 

@@ -19,4 +19,4 @@ def test_paths_of_code_are_there(document):
 
 
 def test_some_paths_are_found():
-    assert "`mpm/transfer.py`" in (ROOT / "docs" / "paper.md").read_text()
+    assert "`mpm/loop/one_pass.py`" in (ROOT / "docs" / "paper.md").read_text()

@@ -56,6 +56,19 @@ def public(state):
     return tuple(jnp.moveaxis(field, -1, 0) for field in fields)
 
 
+def count_in_transfers(jaxpr, name):
+    """How often a primitive occurs in the loops over the three planes of a stencil."""
+    total = 0
+    for equation in jaxpr.eqns:
+        planes = equation.primitive.name == "scan" and equation.params["length"] == 3
+        for value in equation.params.values():
+            for inner in value if isinstance(value, tuple | list) else (value,):
+                inner = getattr(inner, "jaxpr", inner)
+                if hasattr(inner, "eqns"):
+                    total += (count_primitives if planes else count_in_transfers)(inner, name)
+    return total
+
+
 def count_primitives(jaxpr, name):
     """How often a primitive occurs in a jaxpr, those inside others included."""
     total = 0

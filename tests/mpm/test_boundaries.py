@@ -270,7 +270,7 @@ def test_an_impulse_gives_its_region_force_times_time_as_one_body(rest, mass, sp
 
     def given(boundary, time=0.0):
         made = ready(boundary, rest)
-        return np.asarray(made.impulse(rest.T, speed, None, model, GRID, time, 0.01)[0])
+        return np.asarray(made.impulse(rest.T, speed, None, made.loads(model, GRID), time, 0.01)[0])
 
     chosen = (rest < 0.5).all(1)
     momentum = given(push)
@@ -289,7 +289,9 @@ def test_an_impulse_gives_its_region_force_times_time_as_one_body(rest, mass, sp
 
 def on_particles(boundary, rest, speed, time=0.0, position=None):
     position = jnp.asarray(rest.T if position is None else position)
-    return np.asarray(ready(boundary, rest).on_particles(position, speed, time, 0.01))
+    made = ready(boundary, rest)
+    loads = made.loads(Model(None, None, {}, None), GRID)
+    return np.asarray(made.shared().on_particles(position, speed, loads, time, 0.01))
 
 
 def test_translation_acts_by_rest_positions(rest, speed):

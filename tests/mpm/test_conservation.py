@@ -4,9 +4,9 @@ import numpy as np
 
 from jaxphys.mpm.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.state import Config, Model, initial_state
-from jaxphys.mpm.step import step
-from jaxphys.mpm.transfer import particle_to_grid
+from jaxphys.mpm.transfer import scatter, stencil
 
 from .cases import block, public
 
@@ -25,17 +25,10 @@ def angular_momentum(grid, mass, x, v, C):
 
 def test_mass_on_the_grid_is_the_particles_mass():
     config, model, state = block()
-    grid = config.grid
-    rows = particle_to_grid(
-        grid.shape,
-        grid.spacing,
-        grid.shape,
-        jnp.zeros(3, jnp.int32),
-        state.position,
-        model.mass,
-        state.velocity,
-        state.affine,
-    )
+    whole = config.computed
+    at = stencil(whole, jnp.zeros(3, jnp.int32), state.position)
+    rows = jnp.zeros((whole.nodes, 4))
+    rows = scatter(whole, at, rows, model.mass, state.velocity, state.affine)
     np.testing.assert_allclose(jnp.sum(rows[:, 3]), jnp.sum(model.mass), rtol=1e-14)
 
 

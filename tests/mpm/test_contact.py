@@ -14,8 +14,8 @@ from jaxphys.mpm.boundaries import Box, Damping, Plane, Setting, prepare
 from jaxphys.mpm.elasticity import ELASTIC_PARAMETERS, NEO_HOOKEAN
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.law import Law
+from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.state import Config, Model, initial_state
-from jaxphys.mpm.step import step
 
 from .cases import count_primitives
 

@@ -12,8 +12,9 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.spectral import log_stretches
 from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN, lame
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.loop.rollout import _choose, rollout, step
+from jaxphys.mpm.loop.status import SimulationError, check
 from jaxphys.mpm.materials import MATERIALS
-from jaxphys.mpm.rollout import SimulationError, _choose, check, rollout
 from jaxphys.mpm.state import (
     COLLAPSED,
     INVERTED,
@@ -24,7 +25,6 @@ from jaxphys.mpm.state import (
     Model,
     initial_state,
 )
-from jaxphys.mpm.step import step
 from jaxphys.mpm.time_step import isolated_bound, present_bounds
 
 from .cases import block, count_primitives
@@ -122,7 +122,8 @@ def test_the_gradient_carries_no_residual():
 
     numbers, cotangents = kept(jnp.float32)
     assert (numbers, cotangents) == kept(jnp.float64)
-    assert numbers >= 24 * 7 + 4 * 7 + 4 * 9 * 10 * 11  # a start and what the transfers gave
+    # A start, what it gathered, and the rows.
+    assert numbers >= 12 * 7 + 12 * 7 + 4 * 9 * 10 * 11
 
 
 # What is turned inside out, or as flat as a point.
@@ -339,7 +340,7 @@ def test_no_gravity_is_not_traced():
     falling = jaxpr(config, model, state, 1e-3).jaxpr
     floating = jaxpr(config, replace(model, gravity=None), state, 1e-3).jaxpr
     for name in ("add", "mul", "concatenate"):
-        assert count_primitives(falling, name) == count_primitives(floating, name) + 1
+        assert count_primitives(falling, name) == count_primitives(floating, name) + 2  # two passes
     zero = jit_step(config, replace(model, gravity=jnp.zeros(3)), state, 1e-3)
     none = jit_step(config, replace(model, gravity=None), state, 1e-3)
     np.testing.assert_array_equal(zero.velocity, none.velocity)

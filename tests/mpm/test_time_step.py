@@ -11,7 +11,8 @@ from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN, lame
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.state import Config, Model, initial_state
 from jaxphys.mpm.time_step import (
-    hard_limits,
+    contact_bound,
+    hard_limit,
     isolated_bound,
     largest_stable_dt,
     moduli,
@@ -160,8 +161,8 @@ def test_contact_bounds_the_step_where_a_boundary_says_so():
     bounds = largest_stable_dt(*scene(boundaries=(Damping(1.0), Spring(), Spring(1e10))))
     assert bounds.reason == "contact"
     assert bounds.contact == pytest.approx(2 / np.sqrt(1.1e11 * SPACING / 900), rel=1e-6)
-    alone = scene(boundaries=(Spring(1.1e11),))
-    assert float(hard_limits(*alone).max()) == pytest.approx(bounds.contact)
+    _, model, _ = scene(boundaries=(Spring(1.1e11),))
+    assert float(contact_bound(model, scene()[0].grid)) == pytest.approx(bounds.contact)
 
 
 def test_advection_knows_the_fall_that_is_coming():
@@ -177,11 +178,13 @@ def test_advection_knows_the_fall_that_is_coming():
     assert slanted.advection == pytest.approx(0.5 * SPACING / speed, rel=1e-6)
 
 
-def test_hard_limits_name_the_particle_that_is_stiffest():
+def test_hard_limit_is_that_of_each_particle():
     config, model, state = scene()
     moduli = {"youngs_modulus": jnp.array([1e5, 1e5, 4e5, 1e5])}
     model = replace(model, parameters=model.parameters | moduli)
-    limits = hard_limits(config, model, state)
+    (law, _, _) = config.segments[0]
+    density = model.mass / model.volume
+    limits = hard_limit(law, model.parameters, state.deformation, density, SPACING)
     rest = SPACING * np.sqrt(900 / (2 * MU + 3 * LAM))
     np.testing.assert_allclose(limits, rest * np.array([1, 1, 0.5, 1]), rtol=1e-6)
 

@@ -7,7 +7,7 @@ import pytest
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.gaussians.ply import read_ply, write_ply
-from jaxphys.mpm.rollout import SimulationError
+from jaxphys.mpm.loop.status import SimulationError
 from jaxphys.pipeline.animate import animate
 from jaxphys.scene import Domain, Filling, Ground, Object, Plane, Scene, read_scene
 

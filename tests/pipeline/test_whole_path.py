@@ -13,8 +13,8 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.splats import Splats
 from jaxphys.gaussians.gaussians import covariances, from_points, opacities
 from jaxphys.gaussians.harmonics import dc_to_rgb
-from jaxphys.mpm.frames import advance_frame, rollout_frames
-from jaxphys.mpm.rollout import SimulationError
+from jaxphys.mpm.loop.frames import advance_frame, rollout_frames
+from jaxphys.mpm.loop.status import SimulationError
 from jaxphys.pipeline.draw import deformed_gaussians, draw
 from jaxphys.pipeline.frames import simulate
 from jaxphys.render.camera import orbit

@@ -10,7 +10,7 @@ import pytest
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.mpm.boundaries import AnyBoundary
-from jaxphys.mpm.step import step
+from jaxphys.mpm.loop.rollout import step
 from jaxphys.scene import Domain, Object, Scene, scene_from_json, to_json
 from jaxphys.scene.build import build
 

@@ -5,7 +5,7 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import covariances, from_points
-from jaxphys.mpm.frames import rollout_frames
+from jaxphys.mpm.loop.frames import rollout_frames
 from jaxphys.pipeline.draw import draw
 from jaxphys.render.camera import orbit
 from jaxphys.scene import Domain, Object, Region, Rotation, Scene

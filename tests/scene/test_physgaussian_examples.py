@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxphys.gaussians.gaussians import from_points
-from jaxphys.mpm.step import step
+from jaxphys.mpm.loop.rollout import step
 from jaxphys.scene.build import build
 from jaxphys.scene.physgaussian import from_physgaussian
 

@@ -36,9 +36,10 @@ FOREVER = 1e9
 ON_EDGE = 1e-3
 
 # Metadata of fields. Static fields choose the code; derived ones are made by `prepared`, and no
-# file has a name for them.
+# file has a name for them; of these some hold a value of every particle.
 STATIC = {"static": True}
 DERIVED = {"keys": ()}
+PER_PARTICLE = DERIVED | {"per_particle": True}  # (N,), and no part of what all particles share
 PLACE = vector(between(-1e6, 1e6), unit("m"))
 HALF_SIZE = vector(POSITIVE, unit("m"))
 DIRECTION = direction()
@@ -162,18 +163,30 @@ class Boundary(Checked):
         """
         return jnp.zeros((), model.mass.dtype)
 
+    def loads(self, model: Model, grid: Grid) -> dict[str, Array]:
+        """What it must know of every particle, arrays (N,): made once for many steps, of all
+        particles, while its stages see some of them at a time.
+        """
+        own = (entry.name for entry in fields(self) if entry.metadata.get("per_particle"))
+        return {name: getattr(self, name) for name in own}
+
+    def shared(self) -> Self:
+        """Itself without what it holds of every particle, which its stages get as loads."""
+        own = [entry.name for entry in fields(self) if entry.metadata.get("per_particle")]
+        return replace(self, **dict.fromkeys(own))
+
     def impulse(
         self,
         position: Array,
         velocity: Array,
         slip: Array | None,
-        model: Model,
-        grid: Grid,
+        loads: dict[str, Array],
         time: Array,
         dt: Array,
     ) -> tuple[Array, Array | None]:
         """Momentum (3, N) [kg m/s] to be added to what the particles give to the grid, and its rows
-        of `State.slip` afterwards. Position [m] and velocity [m/s] are (3, N).
+        of `State.slip` afterwards. Position [m] and velocity [m/s] are (3, N); loads as `loads`
+        makes them, of these particles. A load of zero must mean no momentum.
         """
         raise NotImplementedError
 
@@ -183,7 +196,9 @@ class Boundary(Checked):
         """Node velocities (3, nx, ny, nz) [m/s] afterwards; coordinates [m] broadcast over them."""
         raise NotImplementedError
 
-    def on_particles(self, position: Array, velocity: Array, time: Array, dt: Array) -> Array:
+    def on_particles(
+        self, position: Array, velocity: Array, loads: dict[str, Array], time: Array, dt: Array
+    ) -> Array:
         """Particle velocities (3, N) [m/s] afterwards; position (3, N) [m] is the one before."""
         raise NotImplementedError
 

@@ -27,8 +27,8 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.fields import one_of
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries.base import (
-    DERIVED,
     ON_EDGE,
+    PER_PARTICLE,
     STATIC,
     Boundary,
     Coordinates,
@@ -80,7 +80,7 @@ class Contact(Boundary):
 
     place: ClassVar[str]  # the field that an object inside of it should be told to change
     acts_on: ActsOn | None = field(default=None, kw_only=True, metadata=STATIC | one_of(ActsOn))
-    radius: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
+    radius: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
 
     @property
     @abstractmethod
@@ -140,11 +140,16 @@ class Contact(Boundary):
         ratio = stiffness(model, grid) / jnp.where(heavy, model.mass, 1)
         return jnp.max(jnp.where(heavy, ratio, 0))
 
-    def impulse(self, position, velocity, slip, model, grid, time, dt):
-        with part("contact"):
-            return self._pushed(position, velocity, slip, stiffness(model, grid), time, dt)
+    def loads(self, model, grid):
+        if not self.at_particles:
+            return {}
+        return super().loads(model, grid) | {"stiffness": stiffness(model, grid)}
 
-    def _pushed(self, position, velocity, slip, k, time, dt):
+    def impulse(self, position, velocity, slip, loads, time, dt):
+        with part("contact"):
+            return self._pushed(position, velocity, slip, loads, time, dt)
+
+    def _pushed(self, position, velocity, slip, loads, time, dt):
         total, kept, first = jnp.zeros_like(position), [], 0
         for face in self.faces(position, time):
             moved = None
@@ -152,12 +157,12 @@ class Contact(Boundary):
                 # `slip` is as the step before left it; the particle has moved by dt v since.
                 moved = slip[first : first + 3] + dt * (velocity - face.velocity)
                 first += 3
-            pressed, moved = deflection(face, array_of(self.radius), moved)
+            pressed, moved = deflection(face, loads["radius"], moved)
             total = total + pressed * face.normal
             if moved is not None:
                 total = total - moved
                 kept.append(moved)
-        return dt * k * total, jnp.concatenate(kept) if kept else None
+        return dt * loads["stiffness"] * total, jnp.concatenate(kept) if kept else None
 
     def on_grid(self, velocity, coordinates: Coordinates, grid, time, dt):
         for face in self.faces(coordinates, time):

@@ -9,8 +9,8 @@ from jax import Array
 
 from jaxphys.core.fields import POSITIVE, between, unit, vector
 from jaxphys.mpm.boundaries.base import (
-    DERIVED,
     HALF_SIZE,
+    PER_PARTICLE,
     PLACE,
     STATIC,
     TIME,
@@ -45,18 +45,20 @@ class Impulse(Boundary):
     start: float = field(default=0.0, metadata=TIME)
     duration: float = field(default=1e-3, metadata=POSITIVE | unit("s"))
     per_particle: bool = field(default=False, metadata=STATIC)
-    chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
+    chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
 
     def prepared(self, setting: Setting) -> Self:
         chosen = setting.in_box(self.centre, self.half_size)
         made = replace(super().prepared(setting), chosen=jnp.asarray(chosen))
         return replace(made, force=made.force * chosen.sum()) if self.per_particle else made
 
-    def impulse(self, position, velocity, slip, model, grid, time, dt):
+    def loads(self, model, grid):
         mass = jnp.where(array_of(self.chosen), model.mass, 0)
         total = jnp.sum(mass)
+        return {"share": mass / jnp.where(total > 0, total, 1)}
+
+    def impulse(self, position, velocity, slip, loads, time, dt):
         # Of the step only what lies within: a push shorter than a step is no stronger for it.
         end = jnp.minimum(time + dt, self.start + self.duration)
         lasts = jnp.clip(end - jnp.maximum(time, self.start), 0, dt)
-        share = mass / jnp.where(total > 0, total, 1)
-        return lasts * array_of(self.force)[:, None] * share, None
+        return lasts * array_of(self.force)[:, None] * loads["share"], None

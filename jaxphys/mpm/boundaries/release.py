@@ -10,13 +10,12 @@ from jax import Array
 
 from jaxphys.core.fields import between, unit
 from jaxphys.mpm.boundaries.base import (
-    DERIVED,
     DIRECTION,
+    PER_PARTICLE,
     TIME,
     Boundary,
     Setting,
     Vector,
-    array_of,
 )
 
 
@@ -41,19 +40,19 @@ class Release(Boundary):
     finish: float = field(metadata=between(-1e6, 1e6) | unit("m"))
     start: float = field(default=0.0, metadata=TIME)
     end: float = field(default=1.0, metadata=TIME)
-    places: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
+    places: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
 
     def prepared(self, setting: Setting) -> Self:
         normal = np.asarray(self.normal, np.float64)
         places = np.asarray(setting.rest, np.float64) @ (normal / np.linalg.norm(normal))
         return replace(super().prepared(setting), places=jnp.asarray(places, setting.dtype))
 
-    def on_particles(self, position, velocity, time, dt):
+    def on_particles(self, position, velocity, loads, time, dt):
         share = jnp.clip((time - self.start) / (self.end - self.start), 0, 1)
         plane = self.begin + share * (self.finish - self.begin)
         # A sweep downwards is one upwards along the reverse of the normal.
         sign = jnp.where(self.finish >= self.begin, 1, -1)
-        places = array_of(self.places)
+        places = loads["places"]
         ahead = sign * (places - plane)
         ahead_of_all = sign * (places - self.begin)
         beyond = sign * (places - self.finish)

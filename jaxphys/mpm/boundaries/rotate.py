@@ -10,11 +10,11 @@ from jax import Array
 
 from jaxphys.core.fields import between, unit
 from jaxphys.mpm.boundaries.base import (
-    DERIVED,
     DIRECTION,
     FOREVER,
     LENGTH,
     ON_EDGE,
+    PER_PARTICLE,
     PLACE,
     TIME,
     Boundary,
@@ -50,7 +50,7 @@ class Rotate(Boundary):
     axial_velocity: float = field(default=0.0, metadata=between(-1e8, 1e8) | unit("m/s"))
     start: float = field(default=0.0, metadata=TIME)
     end: float = field(default=FOREVER, metadata=TIME)
-    chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
+    chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
 
     def prepared(self, setting: Setting) -> Self:
         axis = np.asarray(self.axis, np.float64)
@@ -61,10 +61,8 @@ class Rotate(Boundary):
         chosen = (np.abs(along) < self.half_height - edge) & (across < self.radius - edge)
         return replace(super().prepared(setting), chosen=jnp.asarray(chosen))
 
-    def on_particles(self, position, velocity, time, dt):
+    def on_particles(self, position, velocity, loads, time, dt):
         axis = unit_vector(array_of(self.axis))
         turning = jnp.cross(axis, (position - array_of(self.point)[:, None]).T).T
         motion = self.angular_velocity * turning + (self.axial_velocity * axis)[:, None]
-        return jnp.where(
-            array_of(self.chosen) & active(time, self.start, self.end), motion, velocity
-        )
+        return jnp.where(loads["chosen"] & active(time, self.start, self.end), motion, velocity)

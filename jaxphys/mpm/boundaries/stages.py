@@ -28,21 +28,26 @@ def prepare(boundaries: Iterable[Boundary], setting: Setting) -> tuple[Boundary,
     return tuple(made)
 
 
-def acting(boundaries: Iterable[Boundary], stage: str) -> list[tuple[str, Boundary]]:
-    """Those that act in a stage, each with the name of its part of the program. Damping comes
-    first: what others prescribe is not damped.
+def acting(boundaries: tuple[Boundary, ...], stage: str) -> list[tuple[str, int]]:
+    """Those that act in a stage: the name of each one's part of the program, and its place in the
+    list. Damping comes first: what others prescribe is not damped.
     """
     listed = [
-        (f"boundary {i} {boundary.type}", boundary)
+        (f"boundary {i} {boundary.type}", i)
         for i, boundary in enumerate(boundaries)
         if boundary.acts_in(stage)
     ]
-    return sorted(listed, key=lambda entry: not isinstance(entry[1], Damping))
+    return sorted(listed, key=lambda entry: not isinstance(boundaries[entry[1]], Damping))
+
+
+def loads(model: Model, grid: Grid) -> tuple[dict[str, Array], ...]:
+    """What each boundary must know of every particle, arrays (N,)."""
+    return tuple(boundary.loads(model, grid) for boundary in model.boundaries)
 
 
 def impulses(
-    model: Model,
-    grid: Grid,
+    boundaries: tuple[Boundary, ...],
+    loads: tuple[dict[str, Array], ...],
     position: Array,
     velocity: Array,
     slip: Array | None,
@@ -55,16 +60,12 @@ def impulses(
     total: Array | None = None
     kept: list[Array] = []
     first = 0
-    for name, boundary in acting(model.boundaries, "impulse"):
+    for name, index in acting(boundaries, "impulse"):
+        boundary = boundaries[index]
         rows = boundary.rows
-        if rows and (slip is None or slip.shape[0] < first + rows):
-            raise InputError(
-                f"State.slip has no room for {type(boundary).__name__}, which has friction; give "
-                "initial_state(..., boundaries=model.boundaries)."
-            )
         own = slip[first : first + rows] if rows and slip is not None else None
         with part(name):
-            given, own = boundary.impulse(position, velocity, own, model, grid, time, dt)
+            given, own = boundary.impulse(position, velocity, own, loads[index], time, dt)
             total = given if total is None else total + given
         if rows and own is not None:
             kept.append(own)
@@ -73,7 +74,7 @@ def impulses(
 
 
 def on_grid(
-    model: Model,
+    boundaries: tuple[Boundary, ...],
     grid: Grid,
     nodes: tuple[int, int, int],
     origin: Array,
@@ -85,20 +86,27 @@ def on_grid(
 
     nodes: shape of the window; origin: (3,) its first node.
     """
-    boundaries = acting(model.boundaries, "on_grid")
-    if not boundaries:
+    found = acting(boundaries, "on_grid")
+    if not found:
         return rows
     coordinates = node_coordinates(nodes, grid.spacing, origin, rows.dtype)
     velocity = rows.T[:3].reshape(3, *nodes)
-    for name, boundary in boundaries:
+    for name, index in found:
         with part(name):
-            velocity = boundary.on_grid(velocity, coordinates, grid, time, dt)
+            velocity = boundaries[index].on_grid(velocity, coordinates, grid, time, dt)
     return jnp.concatenate([velocity.reshape(3, -1), rows.T[3:]]).T
 
 
-def on_particles(model: Model, position: Array, velocity: Array, time: Array, dt: Array) -> Array:
+def on_particles(
+    boundaries: tuple[Boundary, ...],
+    loads: tuple[dict[str, Array], ...],
+    position: Array,
+    velocity: Array,
+    time: Array,
+    dt: Array,
+) -> Array:
     """Particle velocities (3, N) [m/s] after the boundaries that act there."""
-    for name, boundary in acting(model.boundaries, "on_particles"):
+    for name, index in acting(boundaries, "on_particles"):
         with part(name):
-            velocity = boundary.on_particles(position, velocity, time, dt)
+            velocity = boundaries[index].on_particles(position, velocity, loads[index], time, dt)
     return velocity

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.mpm.boundaries.base import (
-    DERIVED,
     FOREVER,
     HALF_SIZE,
+    PER_PARTICLE,
     PLACE,
     TIME,
     VELOCITY,
@@ -40,12 +40,12 @@ class Translate(Boundary):
     velocity: Vector = field(default=(0.0, 0.0, 0.0), metadata=VELOCITY)
     start: float = field(default=0.0, metadata=TIME)
     end: float = field(default=FOREVER, metadata=TIME)
-    chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=DERIVED)
+    chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
 
     def prepared(self, setting: Setting) -> Self:
         chosen = setting.in_box(self.centre, self.half_size)
         return replace(super().prepared(setting), chosen=jnp.asarray(chosen))
 
-    def on_particles(self, position, velocity, time, dt):
-        acts = array_of(self.chosen) & active(time, self.start, self.end)
+    def on_particles(self, position, velocity, loads, time, dt):
+        acts = loads["chosen"] & active(time, self.start, self.end)
         return jnp.where(acts, array_of(self.velocity)[:, None], velocity)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import jax
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.transfer import TRANSFERS
 
 
 @dataclass(frozen=True)
@@ -34,16 +33,6 @@ class Checkpointed:
 
 
 Adjoint = Plain | Checkpointed
-
-
-def lean(step: Callable) -> Callable:
-    """`step`, of which a gradient keeps what goes in and what the transfers gave, no more.
-
-    Laws and grid update are cheap to do again, and what automatic differentiation would keep of
-    them is several times the state.
-    """
-    policy = jax.checkpoint_policies.save_only_these_names(TRANSFERS)
-    return jax.checkpoint(step, policy=policy, prevent_cse=False)
 
 
 def repeat(adjoint: Adjoint, body: Callable, carry, length):

@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.adjoint import Adjoint, Plain, for_frames
+from jaxphys.mpm.loop.adjoint import Adjoint, Plain, for_frames
+from jaxphys.mpm.loop.rollout import rollout
 from jaxphys.mpm.motion import Motion
-from jaxphys.mpm.rollout import rollout
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, State
 

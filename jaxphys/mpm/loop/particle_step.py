@@ -1,0 +1,155 @@
+"""What a step does to some particles between the two transfers, as pure functions.
+
+A step is a grid update and one pass over the particles: gather from this grid, `move`, `give` into
+the next one. Between passes particles are placed, deformed and past their law; nobody stores their
+velocity or their affine part.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.core import algebra, compensated
+from jaxphys.core.program import part
+from jaxphys.mpm.boundaries import stages
+from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.law import Law
+from jaxphys.mpm.state import Residual
+
+
+class Shared(NamedTuple):
+    """What is the same for all particles.
+
+    gravity: (3,) [m/s^2] or None; boundaries: without what they hold of every particle; dt: [s];
+    time: [s], at the start of the step that moves; later: at its end, where the next one starts.
+    """
+
+    gravity: Array | None
+    boundaries: tuple
+    dt: Array
+    time: Array
+    later: Array
+
+
+class Matter(NamedTuple):
+    """What no step changes, of some particles: mass (N,) [kg], volume (N,) [m^3], parameters of
+    their law, and the loads of every boundary.
+    """
+
+    mass: Array
+    volume: Array
+    parameters: dict[str, Array]
+    loads: tuple[dict[str, Array], ...]
+
+
+class Particles(NamedTuple):
+    """What a step changes, of some particles, as in `State`; history: the rows of their law."""
+
+    position: Array
+    deformation: Array
+    total: Array | None
+    history: Array | None
+    slip: Array | None
+
+
+class Flow(NamedTuple):
+    """Velocity (3, N) [m/s] and its first moment (3, 3, N) [m^2/s] at some particles."""
+
+    velocity: Array
+    moment: Array
+
+
+def velocity_gradient(grid: Grid, flow: Flow) -> Array:
+    """C = 4 / dx^2 B (3, 3, N) [1/s] (Jiang et al. 2015)."""
+    return flow.moment * (4.0 / grid.spacing**2)
+
+
+def move(
+    grid: Grid,
+    shared: Shared,
+    matter: Matter,
+    particles: Particles,
+    residual: Residual | None,
+    flow: Flow,
+    still: Array | bool,
+) -> tuple[Particles, Residual | None, Flow]:
+    """Particles, residuals and flow after boundaries at particles, x <- x + dt v, and
+    F <- (I + dt C) F.
+
+    still: () bool, whether nothing moves: what comes before the first step.
+    """
+    held = stages.on_particles(
+        shared.boundaries,
+        matter.loads,
+        particles.position,
+        flow.velocity,
+        shared.time,
+        shared.dt,
+    )
+    flow = flow._replace(velocity=jnp.where(still, flow.velocity, held))
+    dt = jnp.where(still, 0, shared.dt)
+    C = velocity_gradient(grid, flow)
+    carried = residual or Residual(None, None, None, None)
+    position, position_rest = compensated.add(
+        particles.position, carried.position, dt * flow.velocity
+    )
+    F, F_rest = compensated.add(
+        particles.deformation, carried.deformation, dt * algebra.matmul(C, particles.deformation)
+    )
+    total, total_rest = particles.total, None
+    if total is not None:
+        with part("second deformation gradient"):
+            total, total_rest = compensated.add(total, carried.total, dt * algebra.matmul(C, total))
+    moved = particles._replace(position=position, deformation=F, total=total)
+    kept = Residual(position_rest, F_rest, total_rest, None)
+    return moved, None if residual is None else kept, flow
+
+
+def give(
+    grid: Grid, law: Law, shared: Shared, matter: Matter, particles: Particles, flow: Flow
+) -> tuple[Particles, Array, Array]:
+    """Particles past their law (return map and stress of the trial gradient together) and past
+    contact, and what they give to the grid: momentum (3, N) [kg m/s] and affine part (3, 3, N).
+    """
+    history = particles.history
+    kept = jnp.zeros((0, *matter.mass.shape), matter.mass.dtype) if history is None else history
+    with part(f"law {law.name}"):
+        F, stress, kept = law.update(matter.parameters, particles.deformation, kept)
+    # Momentum changes by m C per metre, less the impulse of the stress: -dt V tau grad w, in which
+    # MLS-MPM replaces grad w by w (x_i - x_p) 4 / dx^2.
+    impulse = (-4.0 / grid.spacing**2) * shared.dt * matter.volume
+    affine = matter.mass * velocity_gradient(grid, flow) + impulse * stress
+    momentum = matter.mass * flow.velocity
+    given, slip = stages.impulses(
+        shared.boundaries,
+        matter.loads,
+        particles.position,
+        flow.velocity,
+        particles.slip,
+        shared.later,
+        shared.dt,
+    )
+    if given is not None:
+        momentum = momentum + given
+    after = particles._replace(deformation=F, slip=slip)
+    if history is not None:
+        after = after._replace(history=kept)
+    return after, momentum, affine
+
+
+def update_grid(shared: Shared, lightest: Array, rows: Array) -> Array:
+    """Node velocities [m/s] from momentum and mass rows, both (M, 4); the last column is void.
+
+    lightest: [kg] () nodes with no more stand still: below eps^2 of the heaviest particle a node
+    adds less than round-off to any particle, and dividing by its mass could overflow.
+    """
+    mass = rows[:, 3:]
+    filled = mass > lightest
+    rows = rows / jnp.where(filled, mass, 1.0)
+    if shared.gravity is not None:
+        with part("gravity"):
+            # All four columns at once: XLA would otherwise pad each row that a transfer reads.
+            fall = jnp.concatenate([shared.gravity, jnp.zeros_like(shared.gravity[:1])])
+            rows = rows + shared.dt * fall
+    return jnp.where(filled, rows, 0.0)

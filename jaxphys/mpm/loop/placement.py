@@ -1,0 +1,122 @@
+"""Where particles are computed: in which chunks, on which devices."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import jax
+import numpy as np
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
+
+from jaxphys.core.errors import InputError
+
+AXIS = "particles"  # of the mesh
+PARTICLE_BYTES = 256  # of the state and of a pass's temporaries that a particle keeps in the cache
+LEAST = {"cpu": 4_000}  # particles on each device, below which meeting costs more than it saves
+LEAST_ELSEWHERE = 50_000
+
+
+@dataclass(frozen=True)
+class Placement:
+    """How the particles of a step are spread. Part of the program.
+
+    devices: how many; the first ones of `jax.devices()`.
+    chunk: particles that are computed together, at most; None for all that a device has. Chunks
+        that stay in the cache are what makes a processor fast; an accelerator wants one.
+    """
+
+    devices: int = 1
+    chunk: int | None = None
+
+    def __post_init__(self):
+        if self.devices < 1:
+            raise InputError(f"Placement.devices is {self.devices}: give at least 1.")
+        if self.chunk is not None and self.chunk < 1:
+            raise InputError(
+                f"Placement.chunk is {self.chunk}: give at least 1 particle, or None for all."
+            )
+
+    def mesh(self) -> Mesh:
+        """The devices, along one axis.
+
+        Raises:
+            InputError: there are fewer.
+        """
+        return _mesh(self.devices)
+
+    def everywhere(self) -> NamedSharding:
+        """Where arrays lie that every device has as a whole, as a state between two frames."""
+        return NamedSharding(self.mesh(), PartitionSpec())
+
+
+@cache
+def _mesh(count: int) -> Mesh:
+    found = jax.devices()
+    if count > len(found):
+        raise InputError(
+            f"Placement.devices is {count}, but JAX has {len(found)} {found[0].platform} "
+            "device(s); for more on a processor, call "
+            f"jax.config.update('jax_num_cpu_devices', {count}) before anything else of JAX."
+        )
+    return Mesh(np.array(found[:count]), (AXIS,))
+
+
+def spread(placement: Placement, function: Callable, reduce: Callable) -> Callable:
+    """`function(common, own) -> (common results, own results)` over the devices: each has its share
+    of the chunks of `own`, along their first axis, and `reduce` makes one of their common results.
+    """
+    if placement.devices == 1:
+        return function
+
+    def on_each(common, own):
+        results, own = function(common, own)
+        return reduce(results), own
+
+    everywhere, apart = PartitionSpec(), PartitionSpec(AXIS)
+    return jax.shard_map(
+        on_each,
+        mesh=placement.mesh(),
+        in_specs=(everywhere, apart),
+        out_specs=(everywhere, apart),
+        check_vma=False,
+    )
+
+
+def suited(particles: int, devices: int | None = None) -> Placement:
+    """The placement that suits this machine.
+
+    As many devices as have enough to do, and on a processor chunks that stay in a core's second
+    cache. One device alone computes arrays as a whole while they stay in the last cache: all cores
+    work on these, and one on a chunk.
+
+    Args:
+        particles: how many.
+        devices: at most so many; None: as many as there are.
+    """
+    platform = jax.default_backend()
+    least = LEAST.get(platform, LEAST_ELSEWHERE)
+    there = jax.device_count() if devices is None else devices
+    used = max(1, min(there, particles // least))
+    if platform != "cpu":
+        return Placement(used)
+    second, last = cache_bytes()
+    fits = used == 1 and particles * PARTICLE_BYTES <= last
+    return Placement(used, None if fits else max(1024, second // PARTICLE_BYTES))
+
+
+@cache
+def cache_bytes() -> tuple[int, int]:
+    """Sizes of a core's second cache and of the last cache, in bytes; usual ones if unknown."""
+    second, last = 2**20, 2**25
+    for folder in Path("/sys/devices/system/cpu/cpu0/cache").glob("index*"):
+        try:
+            level = int((folder / "level").read_text())
+            size = int((folder / "size").read_text().strip().removesuffix("K")) * 1024
+        except (OSError, ValueError):
+            continue  # told otherwise on this machine
+        if level == 2:
+            second = size
+        elif level == 3:
+            last = size
+    return second, max(second, last)

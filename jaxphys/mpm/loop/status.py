@@ -1,0 +1,152 @@
+"""Whether a step was sound, what failed first, and what is said of it."""
+
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.core import algebra
+from jaxphys.core.errors import InputError
+from jaxphys.mpm.state import (
+    CODES,
+    COLLAPSED,
+    INVERTED,
+    LEFT_GRID,
+    LEFT_WINDOW,
+    NOT_FINITE,
+    OK,
+    STEP_TOO_LARGE,
+    UNSTABLE_STEP,
+    Config,
+    Status,
+)
+from jaxphys.mpm.transfer import base_node, inside
+
+LANES = 16
+COLLAPSE = 1e-3  # share of its volume below which a particle counts as collapsed
+
+
+class SimulationError(InputError):
+    """A simulation failed. `frame`, `step`, `particle` and `code` say where and how."""
+
+    def __init__(self, message: str, frame: int | None, step: int, particle: int, code: int):
+        super().__init__(message)
+        self.frame, self.step, self.particle, self.code = frame, step, particle, code
+
+
+_CAUSES = {
+    NOT_FINITE: (
+        "became infinite or not a number",
+        "take a smaller dt, a softer material, or less force",
+    ),
+    LEFT_GRID: (
+        "left the grid",
+        "enlarge the domain, or add a boundary that holds particles inside",
+    ),
+    STEP_TOO_LARGE: (
+        "moved more than one cell, or was deformed by more than its own size, in one step",
+        "take a smaller dt, or lower the speed",
+    ),
+    LEFT_WINDOW: (
+        "outgrew the window of the grid",
+        "enlarge Config.window, or set it to None",
+    ),
+    INVERTED: (
+        "is turned inside out (det F <= 0)",
+        "start from deformation gradients with det F > 0",
+    ),
+    COLLAPSED: (
+        "was pressed to less than a thousandth of its volume",
+        "take a stiffer material, less force, or a smaller dt",
+    ),
+    UNSTABLE_STEP: (
+        "is stiffer than the step allows",
+        "take a smaller dt (mpm.largest_stable_dt gives one), or a softer or denser material",
+    ),
+}
+
+
+def check(status: Status, frame: int | None = None) -> None:
+    """Raise `SimulationError` with the frame, step, particle and remedy unless all is well.
+
+    Waits for the computation that `status` comes from. Not for use inside jit.
+    """
+    code = int(status.code)
+    if code == OK:
+        return
+    what, remedy = _CAUSES[code]
+    where = "" if frame is None else f"frame {frame}, "
+    number, particle = int(status.step), int(status.particle)
+    raise SimulationError(
+        f"Simulation failed at {where}step {number}: particle {particle} {what}; {remedy}.",
+        frame,
+        number,
+        particle,
+        code,
+    )
+
+
+def failure(
+    config: Config,
+    origin: Array,
+    before: Array,
+    position: Array,
+    velocity: Array,
+    C: Array,
+    F: Array,
+    dt: Array,
+) -> Array:
+    """Code (N,) int32 of each particle after a step: OK, or what failed.
+
+    A step multiplies det F by det(I + dt C), so that only one with |dt C| >= 1 can turn a particle
+    inside out: that is a step too large. What is inverted without one was given so, and no law
+    brings it back: Hencky's take a mirror image for rest.
+
+    origin: of the window (3,); before: positions (3, N) from which the step started.
+    """
+    grid = config.grid
+    # Sums written out: a reduction within a fusion is not vectorised.
+    v, c, f = (algebra.numbers(x) for x in (velocity, C, F))
+    finite = jnp.isfinite(algebra.total(v) + algebra.total(f))
+    slow = algebra.total(x * x for x in v) * dt**2 <= grid.spacing**2
+    slow &= algebra.total(x * x for x in c) * dt**2 <= 1
+    volume = algebra.determinant(F)
+    code = jnp.full(finite.shape, OK, jnp.int32)
+    if config.nodes != grid.shape:
+        # A particle outside of the window was clamped in the transfers of this very step.
+        room = jnp.array(config.nodes, jnp.int32)[:, None] - 3
+        local = base_node(before, grid.spacing, grid.shape) - origin[:, None]
+        code = jnp.where(jnp.all((local >= 0) & (local <= room), axis=0), code, LEFT_WINDOW)
+    code = jnp.where(inside(position, grid.spacing, grid.shape), code, LEFT_GRID)
+    code = jnp.where(volume < COLLAPSE, COLLAPSED, code)
+    code = jnp.where(volume <= 0, INVERTED, code)
+    code = jnp.where(slow, code, STEP_TOO_LARGE)
+    return jnp.where(finite, code, NOT_FINITE)
+
+
+def first_failure(code: Array, index: Array) -> Array:
+    """One number () int32 for codes (N,) of particles `index` (N,): the least of it over any
+    particles names the lowest that failed, and how. Those of a negative index do not count.
+    """
+    failed = (code != OK) & (index >= 0)
+    return least(jnp.where(failed, CODES * index + code, NO_FAILURE))
+
+
+def least(x: Array) -> Array:
+    """The least of (..., N) along the last axis; in lanes where N allows, as vector units want."""
+    if x.shape[-1] % LANES == 0:
+        x = jnp.min(x.reshape(*x.shape[:-1], -1, LANES), axis=-2)
+    return jnp.min(x, axis=-1)
+
+
+NO_FAILURE = 2**31 - 1
+MOST_PARTICLES = NO_FAILURE // CODES
+
+
+def after_step(status: Status, first: Array) -> Status:
+    """The status after a step, with `first_failure` of it. The first failure of all stays."""
+    fails = (status.code == OK) & (first < NO_FAILURE)
+    return Status(
+        code=jnp.where(fails, first % CODES, status.code),
+        step=jnp.where(fails, status.taken, status.step),
+        particle=jnp.where(fails, first // CODES, status.particle),
+        taken=status.taken + 1,
+    )

@@ -1,0 +1,172 @@
+"""The two sums over the 27 nodes i of each particle p, and their transposes.
+
+With weight w and distance d = x_i - x_p:
+
+    to the grid       g_i = sum_p w (a_p + A_p d,  m_p)
+    to the particles  v_p = sum_i w v_i,   B_p = sum_i w v_i d^T
+
+The transpose of the first is the second and the other way round; derivatives by x_p go through w
+and d. Automatic differentiation would store 27 of everything and turn every gather into a scatter.
+
+Layout: rows of four numbers, one per node and, inside the transfers, one per particle, so that a
+node's row is read, scaled and added as one short vector. A loop over the three planes of the
+stencil, nine rows each, keeps the compiled program small and makes XLA store the weights rather
+than compute them for each row again (docs/performance.md).
+"""
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from jaxphys.mpm.transfer.stencil import Stencil, Window
+
+
+def scatter(
+    window: Window, at: Stencil, rows: Array, mass: Array | None, momentum: Array, affine: Array
+) -> Array:
+    """`rows` and what particles give to them: momentum [kg m/s] and mass [kg] of nodes (M, 4).
+
+    Args:
+        window: whose nodes the rows are, x slowest.
+        at: the particles' stencils in it.
+        rows: (M, 4) to add to.
+        mass: (N,) [kg], or None for zero.
+        momentum: (3, N) [kg m/s], the value at the particle.
+        affine: (3, 3, N) [kg/s], what momentum changes by per metre: m C - dt V 4/dx^2 tau for
+            MLS-MPM (Hu et al. 2018, eq. 29).
+    """
+    plane, line = window.shape[1] * window.shape[2], window.shape[2]
+    (wx, wy, wz), (mx, my, mz) = at.weight[..., None], at.moment[..., None]
+    value = _rows(momentum, mass)
+    along = [_rows(affine[:, axis]) for axis in range(3)]
+
+    def add_plane(a, rows):
+        first = at.row + a * plane
+        for b in range(3):
+            w = wx[a] * wy[b]
+            constant = w * value + mx[a] * wy[b] * along[0] + wx[a] * my[b] * along[1]
+            for c in range(3):
+                new = wz[c] * constant + mz[c] * w * along[2]
+                rows = rows.at[first + (b * line + c)].add(
+                    new, mode="promise_in_bounds", wrap_negative_indices=False
+                )
+        return rows
+
+    return jax.lax.fori_loop(0, 3, add_plane, rows)
+
+
+def gather(window: Window, at: Stencil, rows: Array) -> tuple[Array, Array]:
+    """Sums of w g (4, N), and of w g d^T for the first three columns (3, 3, N), of rows g (M, 4).
+
+    Of velocities [m/s] these are the particle's and its first moment B [m^2/s]; C = 4 / dx^2 B
+    (Jiang et al. 2015).
+    """
+    sums, *moments = _over_planes(window, at, rows, *_sum_terms(at))
+    return _particle_last(sums, moments)
+
+
+def scatter_transpose(
+    window: Window, at: Stencil, rows: Array, mass: Array, momentum: Array, affine: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Cotangents of position, mass, momentum and affine of `scatter`, from those of the rows.
+
+    In one loop, for the sake of the rows read.
+    """
+    sum_terms, no_sums = _sum_terms(at)
+    slope_terms, no_slopes = _slope_terms(at, mass, momentum, affine)
+    (sums, *moments), slopes = _over_planes(
+        window,
+        at,
+        rows,
+        lambda a, nodes: (sum_terms(a, nodes), slope_terms(a, nodes)),
+        (no_sums, no_slopes),
+    )
+    sums, moments = _particle_last(sums, moments)
+    return _through_position(slopes, affine, sums), sums[3], sums[:3], moments
+
+
+def gather_slopes(
+    window: Window, at: Stencil, rows: Array, sums: Array, velocity: Array, moment: Array
+) -> Array:
+    """Cotangent (3, N) of position of `gather`, from those of velocity (3, N) and moment (3, 3, N).
+
+    rows: what was gathered from; sums: what `gather` gave first. The cotangent of the rows is
+    `scatter` of the same two.
+    """
+    slopes = _over_planes(window, at, rows, *_slope_terms(at, None, velocity, moment))
+    return _through_position(slopes, moment, sums)
+
+
+def _rows(vectors: Array, last: Array | None = None) -> Array:
+    """Rows (N, 4) from (3, N) and a fourth column, 0 by default."""
+    last = jnp.zeros_like(vectors[0]) if last is None else last
+    return jnp.concatenate([vectors, last[None]]).T
+
+
+def _read(rows, index):
+    return rows.at[index].get(mode="promise_in_bounds", wrap_negative_indices=False)
+
+
+def _over_planes(window, at, rows, terms, nothing):
+    """Sum over the three planes a of the stencil of `terms(a, nodes)`, where nodes[b][c] are the
+    rows (N, 4) at node (a, b, c) of each particle; `nothing` is the zero to start from.
+    """
+    plane, line = window.shape[1] * window.shape[2], window.shape[2]
+
+    def add_plane(a, totals):
+        first = at.row + a * plane
+        nodes = [[_read(rows, first + (b * line + c)) for c in range(3)] for b in range(3)]
+        return jax.tree.map(jnp.add, totals, terms(a, nodes))
+
+    return jax.lax.fori_loop(0, 3, add_plane, nothing)
+
+
+def _sum_terms(at):
+    """Terms of the sums of w g and of w g d along x, y and z, each (N, 4)."""
+    (wx, wy, wz), (mx, my, mz) = at.weight[..., None], at.moment[..., None]
+
+    def terms(a, nodes):
+        w = m = z = 0.0
+        for b in range(3):
+            along = sum(wz[c] * nodes[b][c] for c in range(3))
+            w, m = w + wy[b] * along, m + my[b] * along
+            z = z + wy[b] * sum(mz[c] * nodes[b][c] for c in range(3))
+        return wx[a] * w, mx[a] * w, wx[a] * m, wx[a] * z
+
+    return terms, (jnp.zeros((len(at.row), 4), wx.dtype),) * 4
+
+
+def _slope_terms(at, mass, momentum, affine):
+    """Terms of the sums of grad w (g . (a + A d, m)) along x, y and z, each (N,).
+
+    Nothing is written to the grid here, and a node counts by one number per particle: the particle
+    axis comes last, and the columns of a node's row are read one by one.
+    """
+    (wx, wy, wz), (sx, sy, sz) = at.weight, at.slope
+    dx, dy, dz = at.distance
+
+    def terms(a, nodes):
+        w = s = z = 0.0
+        for b in range(3):
+            constant = momentum + dx[a] * affine[:, 0] + dy[b] * affine[:, 1]
+            pairs = []
+            for c in range(3):
+                node, value = nodes[b][c], constant + dz[c] * affine[:, 2]
+                pair = sum(node[:, i] * value[i] for i in range(3))
+                pairs.append(pair if mass is None else pair + node[:, 3] * mass)
+            weighted = sum(wz[c] * pairs[c] for c in range(3))
+            w, s = w + wy[b] * weighted, s + sy[b] * weighted
+            z = z + wy[b] * sum(sz[c] * pairs[c] for c in range(3))
+        return sx[a] * w, wx[a] * s, wx[a] * z
+
+    return terms, (jnp.zeros_like(wx[0]),) * 3
+
+
+def _particle_last(sums, moments):
+    """(4, N), and (3, 3, N) of the first three columns, from rows."""
+    return sums.T, jnp.stack([moment.T[:3] for moment in moments], axis=1)
+
+
+def _through_position(slopes, affine, sums):
+    """Derivative (3, N) by x_p: through the weights, and through d = x_i - x_p."""
+    return jnp.stack(slopes) - sum(affine[i] * sums[i] for i in range(3))
