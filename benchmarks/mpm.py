@@ -52,6 +52,7 @@ def block_case(cells: int, nodes: int, law: str = "neo-Hookean", seed: int = 0) 
         "youngs_modulus": E,
         "poisson_ratio": nu,
         "dt": 0.5 * 0.7 * spacing / sound,
+        "gravity": (0.0, 0.0, -9.8),
     }
 
 
@@ -88,7 +89,7 @@ def model_and_state(case: dict, devices: int | None = None):
         mass=full("mass"),
         volume=full("volume"),
         parameters={name: full(name) for name in law.parameters},
-        gravity=jnp.array([0.0, 0.0, -9.8], jnp.float32),
+        gravity=jnp.array(case["gravity"], jnp.float32),
     )
     state = initial_state(config, case["position"], case["velocity"], dtype=jnp.float32)
     return windowed(config, state), model, state

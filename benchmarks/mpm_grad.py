@@ -22,7 +22,7 @@ LONG = 1000
 
 def gradient(case: dict, steps: int, adjoint: str):
     """`value_and_gradient` of the mpm suite with the adjoint of that name."""
-    from jaxphys.mpm import adjoint as adjoints
+    from jaxphys.mpm.loop import adjoint as adjoints
 
     return value_and_gradient(case, steps, getattr(adjoints, adjoint)())
 

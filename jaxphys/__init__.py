@@ -9,6 +9,7 @@ import importlib.metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .core.ensemble import over_devices as over_devices
     from .core.errors import InputError as InputError
     from .gaussians.gaussians import Gaussians as Gaussians
     from .mpm.loop.adjoint import Checkpointed as Checkpointed
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from .scene.source import load as load
 
 _HOMES = {
+    "over_devices": "core.ensemble",
     "InputError": "core.errors",
     "Gaussians": "gaussians.gaussians",
     "Checkpointed": "mpm.loop.adjoint",

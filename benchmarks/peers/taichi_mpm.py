@@ -20,7 +20,7 @@ def build(case: dict, threads: int = 2):
     mass, volume = case["mass"], case["volume"]
     E, nu = case["youngs_modulus"], case["poisson_ratio"]
     mu, lam = E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
-    gravity = ti.Vector([0.0, 0.0, -9.8])
+    gravity = ti.Vector(case["gravity"])
 
     x = ti.Vector.field(3, ti.f32, count)
     v = ti.Vector.field(3, ti.f32, count)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -81,6 +82,22 @@ def spread(placement: Placement, function: Callable, reduce: Callable) -> Callab
         out_specs=(everywhere, apart),
         check_vma=False,
     )
+
+
+def gathered(placement: Placement, own: Any) -> Any:
+    """Arrays that the devices share along their first axis, as a whole on each of them.
+
+    Said as what it is: left to itself XLA adds up arrays that are zero but for a device's part.
+    """
+    if placement.devices == 1:
+        return own
+    return jax.shard_map(
+        lambda tree: jax.tree.map(lambda x: jax.lax.all_gather(x, AXIS, tiled=True), tree),
+        mesh=placement.mesh(),
+        in_specs=PartitionSpec(AXIS),
+        out_specs=PartitionSpec(),
+        check_vma=False,
+    )(own)
 
 
 def suited(particles: int, devices: int | None = None) -> Placement:

@@ -21,6 +21,7 @@ from jaxphys.mpm.loop.adjoint import Adjoint, Plain, repeat
 from jaxphys.mpm.loop.chunks import cut, cuts, joined, numbers, orders
 from jaxphys.mpm.loop.one_pass import Fixed, Inputs, extent, numbers_and_flags, one_pass
 from jaxphys.mpm.loop.particle_step import Flow, Matter, Particles, Shared, velocity_gradient
+from jaxphys.mpm.loop.placement import gathered
 from jaxphys.mpm.loop.status import MOST_PARTICLES, after_step
 from jaxphys.mpm.loop.step_check import checked
 from jaxphys.mpm.state import OK, Config, Model, Residual, State, Status
@@ -217,13 +218,16 @@ def _target(config: Config, chunks: Chunks) -> Array:
 
 
 def _join_state(config: Config, before: State, chunks: Chunks, segments, inverse) -> State:
+    particles, flow, residuals = gathered(
+        config.placement, (chunks.particles, chunks.rows, chunks.residuals)
+    )
     whole = partial(joined, cuts=segments, inverse=inverse)
-    flow = whole(list(chunks.rows))  # what the last pass gives in their place
-    histories = [particles.history for particles in chunks.particles]
-    particles = whole([p._replace(history=None) for p in chunks.particles])
+    flow = whole(list(flow))  # what the last pass gives in place of rows
+    histories = [p.history for p in particles]
+    particles = whole([p._replace(history=None) for p in particles])
     residual = None
     if before.residual is not None:
-        residual = whole(list(chunks.residuals))._replace(time=chunks.time_residual)
+        residual = whole(list(residuals))._replace(time=chunks.time_residual)
     history = before.history
     if history is not None:
         count, dtype = history.shape[0], history.dtype

@@ -123,9 +123,9 @@ def _over_planes(window, at, rows, terms, nothing):
 
 def _sum_terms(at):
     """Terms of the sums of w g and of w g d along x, y and z, each (N, 4)."""
-    (wx, wy, wz), (mx, my, mz) = at.weight[..., None], at.moment[..., None]
 
     def terms(a, nodes):
+        (wx, wy, wz), (mx, my, mz) = at.weight[..., None], at.moment[..., None]
         w = m = z = 0.0
         for b in range(3):
             along = sum(wz[c] * nodes[b][c] for c in range(3))
@@ -133,7 +133,7 @@ def _sum_terms(at):
             z = z + wy[b] * sum(mz[c] * nodes[b][c] for c in range(3))
         return wx[a] * w, mx[a] * w, wx[a] * m, wx[a] * z
 
-    return terms, (jnp.zeros((len(at.row), 4), wx.dtype),) * 4
+    return terms, (jnp.zeros((len(at.row), 4), at.weight.dtype),) * 4
 
 
 def _slope_terms(at, mass, momentum, affine):
