@@ -11,13 +11,12 @@ import json
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from flax import nnx
 from safetensors.numpy import save_file
 
-from experiments.priors.training import checkpoints_of
+from experiments.priors.training import averaged, config_of, lines_of
 from jaxphys import weights
 from jaxphys.guidance.bundled.pixel_prior import PixelPrior, PixelPriorConfig
 from jaxphys.guidance.bundled.point_prior import PointPrior, PointPriorConfig
@@ -32,15 +31,6 @@ DATA = (
     "parametric models of experiments/priors/models, Debian sweethome3d-furniture 1.8 (CC0, CC-BY),"
     " @lobehub/fluent-emoji-3d 1.1.0 (MIT; pixel prior only)"
 )
-
-
-def averaged(run: Path, parameters: dict[str, Any]) -> tuple[dict[str, np.ndarray], int]:
-    """The averaged weights of the newest checkpoint, and its step."""
-    newest = checkpoints_of(run.resolve(), parameters).newest()
-    if newest is None:
-        raise SystemExit(f"{run}: holds no checkpoint of this network; train first")
-    step, arrays = newest
-    return {name: arrays[f"average/{name}"] for name in parameters}, step
 
 
 def samples_seen(lines: list[dict], step: int) -> int:
@@ -70,10 +60,9 @@ def main() -> None:
     parser.add_argument("--folder", type=Path, default=weights.FOLDER)
     options = parser.parse_args()
     kind, config_type, script = KINDS[options.name]
-    config = config_type()
+    lines, config = lines_of(options.run), config_of(options.run, config_type)
     module = nnx.eval_shape(lambda: kind(config, rngs=nnx.Rngs(0)))
     arrays, step = averaged(options.run, named_parameters(module))
-    lines = [json.loads(line) for line in (options.run / "log.jsonl").read_text().splitlines()]
     trained = [line["options"] for line in lines if "options" in line][-1]
     reports = [line for line in lines if "held_out" in line and line["step"] <= step]
     if not reports:

@@ -1,9 +1,10 @@
 """Muon (Jordan et al. 2024) for the hidden matrices of a flat dictionary of parameters, else AdamW.
 
-The hidden matrices come stacked, (layers, inputs, outputs), and are orthogonalised together, in
-bfloat16 as its authors do.
+The hidden matrices are those of layers, stacked (layers, inputs, outputs) or in a list, under names
+such as `think/0/perceptron/inner/kernel`. They are orthogonalised in bfloat16, as its authors do.
 """
 
+import re
 from typing import NamedTuple
 
 import jax
@@ -35,6 +36,10 @@ def orthogonalise(matrices: Array, iterations: int = 5) -> Array:
     return jnp.swapaxes(x, 1, 2) if tall else x
 
 
+def _orthogonal(value: Array) -> Array:
+    return orthogonalise(value.reshape(-1, *value.shape[-2:])).reshape(value.shape)
+
+
 class MuonState(NamedTuple):
     momentum: Parameters
 
@@ -49,7 +54,7 @@ def scale_by_muon(decay: float = 0.95) -> optax.GradientTransformation:
         momentum = jax.tree.map(lambda m, g: decay * m + (1 - decay) * g, state.momentum, gradient)
         ahead = jax.tree.map(lambda m, g: decay * m + (1 - decay) * g, momentum, gradient)
         result = {
-            name: 0.2 * max(value.shape[1:]) ** 0.5 * orthogonalise(value)
+            name: 0.2 * max(value.shape[-2:]) ** 0.5 * _orthogonal(value)
             for name, value in ahead.items()
         }
         return result, MuonState(momentum)
@@ -58,7 +63,7 @@ def scale_by_muon(decay: float = 0.95) -> optax.GradientTransformation:
 
 
 def muon(rate: optax.Schedule, weight_decay: float) -> optax.GradientTransformation:
-    """Muon for the stacked matrices (three axes), AdamW without decay for all else."""
+    """Muon for the hidden matrices, AdamW without decay for all else."""
     hidden = optax.chain(
         scale_by_muon(), optax.add_decayed_weights(weight_decay), optax.scale_by_learning_rate(rate)
     )
@@ -78,6 +83,11 @@ def muon(rate: optax.Schedule, weight_decay: float) -> optax.GradientTransformat
     return optax.GradientTransformation(init, update)
 
 
+def is_hidden(name: str, value: Array) -> bool:
+    """Whether it is a matrix of a layer or a stack of them."""
+    return value.ndim == 3 or (bool(re.search(r"/\d+/.*/kernel$", name)) and value.ndim == 2)
+
+
 def _split(parameters: Parameters) -> tuple[Parameters, Parameters]:
-    first = {name: value for name, value in parameters.items() if value.ndim == 3}
-    return first, {name: value for name, value in parameters.items() if value.ndim != 3}
+    first = {name: value for name, value in parameters.items() if is_hidden(name, value)}
+    return first, {name: value for name, value in parameters.items() if name not in first}

@@ -1,5 +1,6 @@
 """Reads the prepared data (see the README.md of its folder) and says what is drawn how often."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +16,11 @@ PRINCIPAL_WEIGHT = 4.0  # how much more often a principal kind is drawn than ano
 class Records:
     """Items (objects or emoji) with captions, points of the first ones and pictures of all.
 
-    name (I,), held_out (I,) bool, caption_start (I + 1,) into caption, embeddings (C, D);
-    points (P, 4096, 3) in [-0.5, 0.5] and colours (P, 4096, 3) uint8 of the first P items;
+    name (I,), held_out (I,) bool, caption_start (I + 1,) into caption, which points into
+    caption_phrases (C, 1 + PHRASES), which points into embeddings (E, D), the last one zeros;
+    captions, C texts;
+    points (P, 4096, 3) in [-0.5, 0.5], normals (P, 4096, 3) int8 times 127 and colours
+    (P, 4096, 3) uint8 of the first P items;
     images (V, 64, 64, 4) uint8 straight alpha, with item, azimuth, elevation, known (V,).
     """
 
@@ -24,8 +28,11 @@ class Records:
     held_out: np.ndarray
     caption_start: np.ndarray
     caption: np.ndarray
+    caption_phrases: np.ndarray
     embeddings: np.ndarray
+    captions: list[str]
     points: np.ndarray
+    normals: np.ndarray
     colours: np.ndarray
     images: np.ndarray
     item: np.ndarray
@@ -53,20 +60,25 @@ class Records:
         return weight
 
     def text(self, items: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """(B, D) embedding of one random caption of each item."""
+        """(B, 1 + PHRASES, D) embeddings of one random caption of each item."""
         start, end = self.caption_start[items], self.caption_start[items + 1]
-        return self.embeddings[self.caption[start + rng.integers(0, end - start)]]
+        captions = self.caption[start + rng.integers(0, end - start)]
+        return self.embeddings[self.caption_phrases[captions]]
 
 
 def load(folder: Path) -> Records:
     """Reads what `assemble` wrote; pictures stay on disk until they are drawn."""
     points = np.load(folder / "points.npz")
+    embeddings = np.load(folder / "text_embeddings.npy")
     with np.load(folder / "items.npz") as items, np.load(folder / "views.npz") as views:
         return Records(
             **{key: items[key] for key in ("name", "held_out", "caption_start", "caption")},
             **{key: views[key] for key in ("item", "azimuth", "elevation", "known")},
-            embeddings=np.load(folder / "text_embeddings.npy"),
+            caption_phrases=np.load(folder / "caption_phrases.npy"),
+            embeddings=np.concatenate([embeddings, np.zeros_like(embeddings[:1])]),
+            captions=json.loads((folder / "captions.json").read_text()),
             points=points["points"],
+            normals=points["normals"],
             colours=points["colours"],
             images=np.load(folder / "images.npy", mmap_mode="r"),
         )

@@ -12,8 +12,11 @@ from flax import nnx
 from jax import Array
 
 from experiments.priors import prompts, records
+from experiments.priors.denoising import denoising_evaluator, denoising_loss
+from experiments.priors.phrases import PHRASES, PhraseEncoder, drop_phrases
 from experiments.priors.training import Task, arguments, train
 from jaxphys.guidance.bundled.pixel_prior import PixelCondition, PixelPrior, PixelPriorConfig
+from jaxphys.guidance.bundled.text_encoder import load_text_encoder
 from jaxphys.guidance.diffusion.samplers import karras_times, sample_heun
 from jaxphys.guidance.diffusion.schedule import guided
 from jaxphys.guidance.views import view_features
@@ -45,16 +48,12 @@ def prepare(batch: dict[str, Array], key: Array) -> tuple[Array, PixelCondition]
     return 2 * shown - 1, PixelCondition(batch["text"], batch["view"] * keep[:, None])
 
 
-def drop(condition: PixelCondition, keep: Array) -> PixelCondition:
-    return condition._replace(text=condition.text * keep[:, None])
-
-
 def sheet(text: np.ndarray, seed: int):
     """A function that draws samples of each prompt: rows from the front, the back, anywhere."""
     count = len(text)
     views = [view_features(np.full(count, a), np.full(count, 0.3)) for a in (0.3, 2.8)]
     views = np.concatenate([*views, np.zeros_like(views[0])]).astype(np.float32)
-    told = PixelCondition(np.tile(text, (3, 1)), views)
+    told = PixelCondition(np.tile(text, (3, 1, 1)), views)
     untold = told._replace(text=np.zeros_like(told.text))
 
     @nnx.jit
@@ -79,7 +78,8 @@ def sheet(text: np.ndarray, seed: int):
 
 
 def main() -> None:
-    options = arguments(__doc__, batch=64).parse_args()
+    parser = arguments(__doc__, batch=64, steps=40_000)
+    options = parser.parse_args()
     data = records.load(options.data)
     weight = data.weights()
     per_view = weight[data.item] / np.bincount(data.item, minlength=len(weight))[data.item]
@@ -93,16 +93,22 @@ def main() -> None:
             "view": view.astype(np.float32),
         }
 
+    def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
+        batch = gather(choose(rng, count), rng)
+        return batch | {"text": drop_phrases(batch["text"], rng)}
+
     rng = np.random.default_rng(options.seed)
     kept_out = np.flatnonzero(data.held_out[data.item])
     kept_out = rng.choice(kept_out, min(256, len(kept_out)), replace=False)
+    config = PixelPriorConfig(phrases=PHRASES, dtype=options.dtype)
+    module = PixelPrior(config, rngs=nnx.Rngs(options.seed))
+    shown = (*prompts.PROMPTS, *prompts.ATTRIBUTES)
     task = Task(
-        module=PixelPrior(PixelPriorConfig(dtype=options.dtype), rngs=nnx.Rngs(options.seed)),
-        draw=lambda rng, count: gather(choose(rng, count), rng),
-        prepare=prepare,
-        drop=drop,
-        held_out=gather(np.sort(kept_out), rng),
-        picture=sheet(prompts.embeddings(options.data), options.seed),
+        module=module,
+        draw=draw,
+        loss=denoising_loss(prepare),
+        evaluate=denoising_evaluator(module, prepare, gather(np.sort(kept_out), rng)),
+        picture=sheet(PhraseEncoder(load_text_encoder())(shown), options.seed),
     )
     train(task, options)
 

@@ -1,6 +1,6 @@
 """Trains the point prior.
 
-    python -m experiments.priors.train_points --data PREPARED --run RUN --minutes 60
+    python -m experiments.priors.train_points --data PREPARED --run RUN
 
 Stop it at any time; the same command goes on from the newest checkpoint, with other --points too.
 """
@@ -12,7 +12,10 @@ from flax import nnx
 from jax import Array
 
 from experiments.priors import prompts, records
-from experiments.priors.fresh import fresh_clouds, kind_of
+from experiments.priors.clouds import Cloud, cloud_source, held_out_clouds
+from experiments.priors.denoising import denoising_evaluator, denoising_loss
+from experiments.priors.dots import dot_rows
+from experiments.priors.phrases import PHRASES, PhraseEncoder, drop_phrases
 from experiments.priors.training import Task, arguments, train
 from jaxphys.guidance.bundled.point_prior import (
     PointCondition,
@@ -29,30 +32,7 @@ from jaxphys.guidance.diffusion.schedule import guided
 def prepare(batch: dict[str, Array], key: Array) -> tuple[Array, PointCondition]:
     """Points and colours in the prior's frame."""
     del key
-    points = batch["points"].astype(jnp.float32)
-    return to_frame(points, batch["colours"].astype(jnp.float32) / 255), PointCondition(
-        batch["text"]
-    )
-
-
-def drop(condition: PointCondition, keep: Array) -> PointCondition:
-    return PointCondition(condition.text * keep[:, None])
-
-
-def dots(points: np.ndarray, colours: np.ndarray, azimuth: float, size: int = 96) -> np.ndarray:
-    """(size, size, 3) picture of a cloud as 2x2 dots, far ones first, seen 0.3 rad from above."""
-    c, s, e = np.cos(azimuth), np.sin(azimuth), 0.3
-    right = points @ np.array([-s, c, 0.0])
-    up = points @ np.array([-np.sin(e) * c, -np.sin(e) * s, np.cos(e)])
-    near = points @ np.array([np.cos(e) * c, np.cos(e) * s, np.sin(e)])
-    order = np.argsort(near)
-    column = np.clip((0.5 + right[order] * 0.8) * size, 0, size - 2).astype(int)
-    row = np.clip((0.5 - up[order] * 0.8) * size, 0, size - 2).astype(int)
-    image = np.full((size, size, 3), 235, np.uint8)
-    for i in (0, 1):
-        for j in (0, 1):
-            image[row + i, column + j] = (255 * colours[order]).astype(np.uint8)
-    return image
+    return to_frame(batch["points"], batch["colours"]), PointCondition(batch["text"])
 
 
 def sheet(text: np.ndarray, seed: int, count: int = 2048):
@@ -75,62 +55,48 @@ def sheet(text: np.ndarray, seed: int, count: int = 2048):
 
     def picture(module: PointPrior) -> np.ndarray:
         points, colours = (np.asarray(a) for a in from_frame(draw(module)))
-        rows = [
-            np.concatenate([dots(p, c, azimuth) for p, c in zip(points, colours, strict=True)], 1)
-            for azimuth in (0.4, 2.8)
-        ]
-        return np.concatenate(rows)
+        return dot_rows(zip(points, colours, strict=True))
 
     return picture
 
 
 def main() -> None:
-    parser = arguments(__doc__, batch=12)
+    parser = arguments(__doc__, batch=12, steps=30_000)
     parser.add_argument("--points", type=int, default=1024, help="points a sample")
-    parser.add_argument(
-        "--fresh", action="store_true", help="new variants of parametric kinds at every step"
-    )
+    parser.add_argument("--kinds", nargs="*", help="of these parametric kinds alone")
+    parser.add_argument("--latest", type=float, default=1.0, help="highest noise level")
     options = parser.parse_args()
-    data = records.load(options.data)
-    clouds = len(data.points)
-    choose = records.sampler(data.weights()[:clouds])
+    encode = PhraseEncoder(load_text_encoder())
 
-    def gather(items: np.ndarray, rng: np.random.Generator) -> dict[str, np.ndarray]:
-        # The 4096 points lie along a space-filling curve: every k-th of them is an even subset.
-        stride = data.points.shape[1] // options.points
-        at = np.arange(options.points) * stride
-        at = at + rng.integers(0, stride, (len(items), options.points))
+    def batch_of(clouds: list[Cloud]) -> dict[str, np.ndarray]:
         return {
-            "points": np.take_along_axis(data.points[items], at[..., None], 1),
-            "colours": np.take_along_axis(data.colours[items], at[..., None], 1),
-            "text": data.text(items, rng),
+            "points": np.stack([cloud.points for cloud in clouds]).astype(np.float32),
+            "colours": np.stack([cloud.colours for cloud in clouds]).astype(np.float32),
+            "text": encode([cloud.caption for cloud in clouds]),
         }
 
-    kinds = [kind_of(name) for name in data.name[:clouds]]
-    encode = load_text_encoder() if options.fresh else None
+    data = records.load(options.data) if options.data else None
+    source = cloud_source(data, options.kinds, options.points)
 
     def draw(rng: np.random.Generator, count: int) -> dict[str, np.ndarray]:
-        items = choose(rng, count)
-        batch = gather(items, rng)
-        if encode is not None:
-            new = [row for row, item in enumerate(items) if kinds[item] is not None]
-            names = [kinds[items[row]] for row in new]
-            batch["points"][new], batch["colours"][new], captions = fresh_clouds(
-                names, options.points, rng
-            )
-            batch["text"][new] = encode(captions)
-        return batch
+        batch = batch_of(source(rng, count))
+        return batch | {"text": drop_phrases(batch["text"], rng)}
 
-    rng = np.random.default_rng(options.seed)
-    kept_out = np.flatnonzero(data.held_out[:clouds])
-    kept_out = rng.choice(kept_out, min(128, len(kept_out)), replace=False)
+    config = PointPriorConfig(
+        latent_width=320,
+        blocks=4,
+        latent_hidden=640,
+        phrases=PHRASES,
+        dtype=options.dtype,
+    )
+    module = PointPrior(config, rngs=nnx.Rngs(options.seed))
+    held_out = batch_of(held_out_clouds(data, options.kinds, options.points))
     task = Task(
-        module=PointPrior(PointPriorConfig(dtype=options.dtype), rngs=nnx.Rngs(options.seed)),
+        module=module,
         draw=draw,
-        prepare=prepare,
-        drop=drop,
-        held_out=gather(np.sort(kept_out), rng),
-        picture=sheet(prompts.embeddings(options.data), options.seed),
+        loss=denoising_loss(prepare, options.latest),
+        evaluate=denoising_evaluator(module, prepare, held_out),
+        picture=sheet(encode((*prompts.PROMPTS, *prompts.ATTRIBUTES)), options.seed),
     )
     train(task, options)
 

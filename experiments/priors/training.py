@@ -1,7 +1,7 @@
-"""The loop that trains either prior: resumable, logged, with an averaged copy of the weights.
+"""The loop that trains every network: resumable, logged, with an averaged copy of the weights.
 
 Everything a run draws is a function of (seed, step), so that a run that was stopped and resumed is
-the run that was not. It trains in bfloat16 with float32 master weights, on any backend.
+the run that was not. Master weights are float32, on any backend.
 """
 
 import argparse
@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,29 +26,25 @@ from PIL import Image
 
 from experiments.priors.muon import muon
 from jaxphys.core.checkpoints import Checkpoints, by_name, from_names
-from jaxphys.guidance.diffusion.schedule import add_noise, interpret
 from jaxphys.networks.parameters import named_parameters, with_parameters
 
 Batch = dict[str, np.ndarray]
-EVALUATION_TIMES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
 @dataclass(frozen=True)
 class Task:
-    """What differs between the priors.
+    """What differs between the networks.
 
     draw: (generator, batch size) -> host arrays of a training batch.
-    prepare: (batch, key) -> (clean samples, condition); random parts that are cheap on the device.
-    drop: (condition, keep (B,) bool) -> condition without its text where not kept.
-    held_out: fixed arrays of the held-out objects, for `prepare`.
+    loss: (module, batch, key) -> scalar.
+    evaluate: parameters -> held-out figures, for the log.
     picture: (module with averaged weights) -> (H, W, 3) uint8 of samples.
     """
 
     module: nnx.Module
     draw: Callable[[np.random.Generator, int], Batch]
-    prepare: Callable[[Batch, Array], tuple[Array, Any]]
-    drop: Callable[[Any, Array], Any]
-    held_out: Batch
+    loss: Callable[[nnx.Module, Batch, Array], Array]
+    evaluate: Callable[[dict[str, Array]], dict[str, Any]]
     picture: Callable[[nnx.Module], np.ndarray]
 
 
@@ -59,64 +55,42 @@ class TrainState(NamedTuple):
     step: Array
 
 
-def arguments(description: str, *, batch: int) -> argparse.ArgumentParser:
+def arguments(description: str, *, batch: int, steps: int) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--data", type=Path, required=True, help="folder of prepared data")
+    parser.add_argument("--data", type=Path, help="folder of prepared data")
     parser.add_argument("--run", type=Path, required=True, help="folder of checkpoints and logs")
-    parser.add_argument("--minutes", type=float, default=60.0, help="stop after so long")
+    parser.add_argument("--steps", type=int, default=steps, help="the step at which it is trained")
+    parser.add_argument("--minutes", type=float, default=1e6, help="stop after so long")
     parser.add_argument("--batch", type=int, default=batch)
     parser.add_argument("--learning-rate", type=float, default=1.5e-3)
     parser.add_argument("--warmup", type=int, default=200)
+    parser.add_argument("--cooldown", type=float, default=0.3, help="last share, falling to 0")
     parser.add_argument("--average", type=float, default=0.998, help="decay of averaged weights")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--dtype", default="bfloat16")
+    parser.add_argument("--dtype", default="float32")
     parser.add_argument("--report-minutes", type=float, default=10.0)
     parser.add_argument("--save-minutes", type=float, default=5.0)
     return parser
 
 
 def optimiser(options: argparse.Namespace) -> optax.GradientTransformation:
-    """Muon for the matrices of the hidden layers, AdamW for the rest, with one learning rate."""
-    rate = optax.linear_schedule(0.0, options.learning_rate, options.warmup)
-    return optax.chain(optax.clip_by_global_norm(1.0), muon(rate, weight_decay=0.02))
-
-
-def denoising_error(
-    module: nnx.Module, clean: Array, condition: Any, noise: Array, times: Array
-) -> tuple[Array, Array]:
-    """Mean squared error per sample of the velocity and of the clean sample, (B,) each.
-
-    The velocity's is the clean one's divided by sigma^2 (Salimans & Ho 2022), for which sigma is
-    kept from 0.05 up.
+    """Muon for the matrices of the hidden layers, AdamW for the rest, with one learning rate: up,
+    level, and down to zero at the last step (Haegele et al. 2024).
     """
-    schedule = module.schedule
-    noisy = add_noise(schedule, clean, noise, times)
-    prediction = module(noisy, times, condition)
-    estimate = interpret(schedule, module.config.kind, prediction, noisy, times)
-    axes = tuple(range(1, clean.ndim))
-    error = jnp.mean((estimate.clean - clean) ** 2, axes)
-    sigma = schedule.alpha_sigma(times)[1]
-    return error / jnp.maximum(sigma, 0.05) ** 2, error
-
-
-def spread_times(key: Array, count: int) -> Array:
-    """One time in each of `count` equal parts of [0, 1] (Kingma et al. 2021), in random order."""
-    shuffle, offset = jax.random.split(key)
-    times = (jnp.arange(count) + jax.random.uniform(offset, (count,))) / count
-    return jax.random.permutation(shuffle, times)
+    cooldown = max(1, int(options.cooldown * options.steps))
+    rate = optax.join_schedules(
+        [
+            optax.linear_schedule(0.0, options.learning_rate, options.warmup),
+            optax.linear_schedule(options.learning_rate, 0.0, cooldown),
+        ],
+        [options.steps - cooldown],
+    )
+    return optax.chain(optax.clip_by_global_norm(1.0), muon(rate, weight_decay=0.02))
 
 
 def make_step(task: Task, transform: optax.GradientTransformation, options: argparse.Namespace):
     def loss(parameters: dict[str, Array], batch: Batch, key: Array) -> Array:
-        module = with_parameters(task.module, parameters)
-        prepare, drop, noise, times = jax.random.split(key, 4)
-        clean, condition = task.prepare(batch, prepare)
-        condition = task.drop(condition, jax.random.uniform(drop, clean.shape[:1]) > 0.1)
-        drawn = jax.random.normal(noise, clean.shape)
-        velocity, _ = denoising_error(
-            module, clean, condition, drawn, spread_times(times, clean.shape[0])
-        )
-        return velocity.mean()
+        return task.loss(with_parameters(task.module, parameters), batch, key)
 
     @jax.jit
     def step(state: TrainState, batch: Batch) -> tuple[TrainState, Array]:
@@ -129,33 +103,6 @@ def make_step(task: Task, transform: optax.GradientTransformation, options: argp
         return TrainState(parameters, average, inner, state.step + 1), value
 
     return step
-
-
-def evaluator(task: Task):
-    """Held-out error of the clean sample by noise level, with the text and without."""
-
-    @jax.jit
-    def errors(parameters: dict[str, Array], batch: Batch, time: Array) -> tuple[Array, Array]:
-        module = with_parameters(task.module, parameters)
-        prepare, noise = jax.random.split(jax.random.key(17))
-        clean, condition = task.prepare(batch, prepare)
-        count = clean.shape[0]
-        drawn, times = jax.random.normal(noise, clean.shape), jnp.full((count,), time)
-        nothing = task.drop(condition, jnp.zeros((count,), bool))
-        _, told = denoising_error(module, clean, condition, drawn, times)
-        _, untold = denoising_error(module, clean, nothing, drawn, times)
-        return told.mean(), untold.mean()
-
-    def evaluate(parameters: dict[str, Array]) -> dict[str, dict[str, float]]:
-        rows = {t: errors(parameters, task.held_out, jnp.float32(t)) for t in EVALUATION_TIMES}
-        return {
-            "held_out": {str(t): round(float(told), 6) for t, (told, _) in rows.items()},
-            "held_out_no_text": {
-                str(t): round(float(untold), 6) for t, (_, untold) in rows.items()
-            },
-        }
-
-    return evaluate
 
 
 @contextmanager
@@ -180,8 +127,37 @@ def checkpoints_of(run: Path, parameters: dict[str, Any]) -> Checkpoints:
     return Checkpoints(run / "checkpoints", identity)
 
 
+def averaged(run: Path, parameters: dict[str, Any]) -> tuple[dict[str, np.ndarray], int]:
+    """The averaged weights of the newest checkpoint, and its step."""
+    newest = checkpoints_of(run.resolve(), parameters).newest()
+    if newest is None:
+        raise SystemExit(f"{run}: holds no checkpoint of this network; train first")
+    step, arrays = newest
+    return {name: arrays[f"average/{name}"] for name in parameters}, step
+
+
+def lines_of(run: Path) -> list[dict]:
+    """The log of a run."""
+    return [json.loads(line) for line in (run / "log.jsonl").read_text().splitlines()]
+
+
+def trained(run: Path, kind: Callable[..., nnx.Module], config_type: type) -> nnx.Module:
+    """The network of a run with its averaged weights, in float32."""
+    config = config_of(run, config_type)
+    module = nnx.eval_shape(lambda: kind(config, rngs=nnx.Rngs(0)))
+    arrays, _ = averaged(run, named_parameters(module))
+    return with_parameters(module, {name: jnp.asarray(array) for name, array in arrays.items()})
+
+
+def config_of(run: Path, config_type: type) -> Any:
+    """The sizes of a run's network, to compute in float32."""
+    config = [line["config"] for line in lines_of(run) if "config" in line][-1]
+    return config_type(**{**config, "dtype": "float32"})
+
+
 def train(task: Task, options: argparse.Namespace) -> None:
-    """Trains for `options.minutes` from the newest checkpoint in `options.run`, or from scratch."""
+    """Trains to step `options.steps`, or for `options.minutes`, from the newest checkpoint in
+    `options.run`, or from scratch."""
     run = options.run.resolve()
     run.mkdir(parents=True, exist_ok=True)
     transform = optimiser(options)
@@ -190,16 +166,19 @@ def train(task: Task, options: argparse.Namespace) -> None:
     checkpoints = checkpoints_of(run, parameters)
     if newest := checkpoints.newest():
         state = from_names(state, newest[1])
-    step, evaluate = make_step(task, transform, options), evaluator(task)
+    step = make_step(task, transform, options)
     log = (run / "log.jsonl").open("a", buffering=1)
     settings = {k: str(v) if isinstance(v, Path) else v for k, v in vars(options).items()}
-    log.write(json.dumps({"start": int(state.step), "options": settings}) + "\n")
+    start = {"start": int(state.step), "options": settings, "config": asdict(task.module.config)}
+    log.write(json.dumps(start) + "\n")
 
-    def report(losses: list[Array], seconds: float) -> None:
+    def report(losses: list[Array], seconds: float, busy: float) -> None:
+        count = max(len(losses), 1)
         row = {"step": int(state.step), "loss": round(float(np.mean(jax.device_get(losses))), 6)}
         row |= {
-            "seconds_per_step": round(seconds / max(len(losses), 1), 3),
-            **evaluate(state.average),
+            "seconds_per_step": round(seconds / count, 3),
+            "cpu_seconds_per_step": round(busy / count, 3),
+            **task.evaluate(state.average),
         }
         log.write(json.dumps(row) + "\n")
         picture = task.picture(with_parameters(task.module, state.average))
@@ -209,23 +188,26 @@ def train(task: Task, options: argparse.Namespace) -> None:
         return task.draw(np.random.default_rng((options.seed, number)), options.batch)
 
     started = last_report = last_save = time.monotonic()
+    busy = time.process_time()
     losses: list[Array] = []
     # The host draws the next batch while the device works on this one.
     with stop_on_signal() as stopping, ThreadPoolExecutor(1) as ahead:
         coming = ahead.submit(batch_of, int(state.step))
-        while not stopping() and time.monotonic() - started < 60 * options.minutes:
+        while int(state.step) < options.steps and not stopping():
+            if time.monotonic() - started > 60 * options.minutes:
+                break
             batch, coming = coming.result(), ahead.submit(batch_of, int(state.step) + 1)
             state, value = step(state, batch)
             losses.append(jax.block_until_ready(value))
             now = time.monotonic()
             if now - last_report > 60 * options.report_minutes:
-                report(losses, now - last_report)
-                losses, last_report = [], time.monotonic()
+                report(losses, now - last_report, time.process_time() - busy)
+                losses, last_report, busy = [], time.monotonic(), time.process_time()
             if now - last_save > 60 * options.save_minutes:
                 checkpoints.save(int(state.step), by_name(state))
                 last_save = now
         if int(state.step) not in checkpoints.steps():
             checkpoints.save(int(state.step), by_name(state))
         if losses and not stopping():
-            report(losses, time.monotonic() - last_report)
+            report(losses, time.monotonic() - last_report, time.process_time() - busy)
     log.close()

@@ -3,10 +3,10 @@
 import numpy as np
 
 from experiments.priors import records
+from experiments.priors.clouds import cloud_source, kind_of
 from experiments.priors.data import splat
 from experiments.priors.data.parametric import prepared
 from experiments.priors.data.pictures import pictures
-from experiments.priors.fresh import fresh_clouds, kind_of
 from experiments.priors.models import PRINCIPAL
 from experiments.priors.models.palette import golden_directions
 from jaxphys.guidance import views
@@ -88,13 +88,13 @@ def test_fresh_clouds_are_lit_new_and_repeatable():
     kinds = [kind_of(name) for name in ("parametric-t-shirt-003", "parametric-fir_tree-011")]
     assert kinds == ["t-shirt", "fir tree"]
     assert kind_of("furniture-chairs-one") is None and kind_of("emoji-1f34e") is None
-    points, colours, said = fresh_clouds(kinds, 256, np.random.default_rng(1))
-    assert points.shape == colours.shape == (2, 256, 3)
-    assert points.dtype == np.float16 and colours.dtype == np.uint8 and len(said) == 2
-    again = fresh_clouds(kinds, 256, np.random.default_rng(1))
-    other = fresh_clouds(kinds, 256, np.random.default_rng(2))
-    np.testing.assert_array_equal(points, again[0])
-    assert not np.array_equal(points, other[0])
+    draw = cloud_source(None, ["mushroom"], 256)
+    one, two = draw(np.random.default_rng(1), 2)
+    assert one.points.shape == one.colours.shape == one.normals.shape == (256, 3)
+    assert "mushroom" in one.caption or "toadstool" in one.caption
+    again = draw(np.random.default_rng(1), 2)
+    np.testing.assert_array_equal(one.points, again[0].points)
+    assert not np.array_equal(one.points, two.points)
 
 
 def test_kinds_are_drawn_alike_however_many_variants_there_are():

@@ -35,7 +35,7 @@ def guides():
         latent_hidden=32,
         rank=4,
     )
-    text = jnp.ones(12, jnp.float32) / 12**0.5
+    text = jnp.ones((1, 12), jnp.float32) / 12**0.5
     return Guides(
         PixelGuide(PixelPrior(pixel, rngs=nnx.Rngs(0)), text),
         PointGuide(PointPrior(point, rngs=nnx.Rngs(0)), text),

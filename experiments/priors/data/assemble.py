@@ -13,11 +13,13 @@ import numpy as np
 from tqdm import tqdm
 
 from experiments.priors.data.prepare import POINTS, held_out
+from experiments.priors.phrases import PHRASES
 from jaxphys.core.files import write_json
+from jaxphys.guidance.guides import phrases_of
 
 
 def assemble(objects: Path, prepared: Path, encode) -> dict:
-    """Writes the data set; `encode(list of captions) -> (C, D)`. Returns its summary."""
+    """Writes the data set; `encode(list of phrases) -> (E, D)`. Returns its summary."""
     files = sorted(objects.glob("*.npz"))
     # Items with points come first, so that the index of a point cloud is the index of its item.
     files.sort(key=lambda file: file.name.startswith("emoji-"))
@@ -63,12 +65,20 @@ def assemble(objects: Path, prepared: Path, encode) -> dict:
         caption=np.concatenate(of_item).astype(np.int32),
     )
     write_json(aside / "captions.json", list(captions))
-    np.save(aside / "text_embeddings.npy", encode(list(captions)).astype(np.float32))
+    phrases: dict[str, int] = {}
+    spoken = np.full((len(captions), 1 + PHRASES), -1, np.int32)
+    for row, caption in zip(spoken, captions, strict=True):
+        said = phrases_of(caption, PHRASES)
+        row[: len(said)] = [phrases.setdefault(phrase, len(phrases)) for phrase in said]
+    np.save(aside / "caption_phrases.npy", spoken)
+    write_json(aside / "phrases.json", list(phrases))
+    np.save(aside / "text_embeddings.npy", encode(list(phrases)).astype(np.float32))
     summary = {
         "items": len(files),
         "clouds": clouds,
         "images": sum(counts),
         "captions": len(captions),
+        "phrases": len(phrases),
     }
     write_json(aside / "summary.json", summary)
     old = prepared.with_name(f"{prepared.name}.old")

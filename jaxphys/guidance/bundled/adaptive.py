@@ -209,6 +209,21 @@ class AdaptiveLayer(nnx.Module):
         return x + spread(gate_2, x.shape[1]) * self.perceptron(inner)
 
 
+class PhraseTokens(nnx.Module):
+    """Tokens (B, R, width) to attend to, one for each row of (B, R, text) unit embeddings: the
+    object and what else a prompt says. Rows of zeros say nothing, and have a token all the same.
+    """
+
+    def __init__(self, text: int, rows: int, width: int, *, rngs: nnx.Rngs):
+        self.read = TrainableLinear(text, width, rngs=rngs)
+        self.place = nnx.Param(jax.random.normal(rngs.params(), (rows, width)))
+
+    def __call__(self, text: Array) -> Array:
+        batch, rows, width = text.shape
+        place = spread(self.place[...].astype(text.dtype).reshape(1, -1), batch)
+        return self.read(text * width**0.5) + place.reshape(batch, rows, -1)
+
+
 Stacked = TypeVar("Stacked", bound=nnx.Module)
 
 

@@ -7,7 +7,7 @@ from jax import Array
 
 from jaxphys.guidance.bundled.pixel_prior import PixelCondition, PixelPrior
 from jaxphys.guidance.bundled.priors import load_pixel_prior
-from jaxphys.guidance.bundled.text_encoder import object_embedding
+from jaxphys.guidance.bundled.text_encoder import prompt_embeddings
 from jaxphys.guidance.diffusion.score_distillation import (
     Distillation,
     DistillationConfig,
@@ -30,7 +30,7 @@ def image_distillation(
     Args:
         prior: the pixel prior, its parameters not differentiated.
         images: (B, R, R, 3) in [0, 1], opaque, on random backgrounds as in training.
-        text: (B, D) unit embeddings of the prompt.
+        text: (B, R, D) embeddings of the prompt, see `prompt_embeddings`.
         view: (B, 4), `view_features` of each picture.
         key: decides noise levels and noise.
         config: see `DistillationConfig`.
@@ -42,7 +42,7 @@ def image_distillation(
 
 
 class PixelGuide(NamedTuple):
-    """The bundled pixel prior and the prompt's embedding (D,)."""
+    """The bundled pixel prior and the prompt's embeddings (R, D)."""
 
     prior: PixelPrior
     text: Array
@@ -58,8 +58,9 @@ class PixelGuide(NamedTuple):
 
 
 def bundled_image_guide(prompt: str) -> PixelGuide:
-    """The pixel prior that comes with the package, told the object of a refined prompt.
+    """The pixel prior that comes with the package, told a refined prompt.
 
     Raises InputError if its weights are missing or damaged.
     """
-    return PixelGuide(load_pixel_prior()[0], object_embedding(prompt))
+    prior = load_pixel_prior()[0]
+    return PixelGuide(prior, prompt_embeddings(prompt, prior.config.phrases))

@@ -16,6 +16,7 @@ from jax import Array
 from jaxphys.guidance.bundled.adaptive import (
     AdaptiveLayer,
     Modulation,
+    PhraseTokens,
     SquaredPerceptron,
     TrainableLinear,
     apply_stack,
@@ -33,11 +34,12 @@ QUARTERS = ((0, 0), (0, 1), (1, 0), (1, 1))
 
 @dataclass(frozen=True)
 class PixelPriorConfig:
-    """Sizes of the network and the frame of its data."""
+    """Sizes of the network and the frame of its data. `phrases` are read beside the object."""
 
     resolution: int = 64
     patch: int = 8
     text: int = 384
+    phrases: int = 0
     width: int = 256
     layers: int = 5
     head_width: int = 64
@@ -49,7 +51,8 @@ class PixelPriorConfig:
 
 
 class PixelCondition(NamedTuple):
-    """text: (B, text) unit sentence embedding, zeros for any text; view: (B, 4), see views.py."""
+    """text: (B, 1 + phrases, text) unit embeddings of the object and of what else is said of it,
+    zeros where nothing is; view: (B, 4), see views.py."""
 
     text: Array
     view: Array
@@ -67,6 +70,8 @@ class PixelPrior(nnx.Module):
         self.position = nnx.Param(0.02 * jax.random.normal(rngs.params(), (tokens, width)))
         self.time = SquaredPerceptron(128, width, width, rngs=rngs)
         self.text = TrainableLinear(config.text, width, rngs=rngs)
+        rows = 1 + config.phrases
+        self.phrases = PhraseTokens(config.text, rows, width, rngs=rngs) if config.phrases else None
         self.view = SquaredPerceptron(FEATURES, 64, width, rngs=rngs)
         self.mix = SquaredPerceptron(width, width, width, rngs=rngs)
 
@@ -115,12 +120,15 @@ class PixelPrior(nnx.Module):
         dtype = jnp.dtype(self.config.dtype)
         text, view = (jnp.asarray(c, dtype) for c in condition)
         told = self.time(time_features(time, 128).astype(dtype))
-        told = told + self.text(text * self.config.text**0.5) + self.view(view)
+        told = told + self.text(text[:, 0] * self.config.text**0.5) + self.view(view)
         told = told + self.mix(normalise(told))
         told = normalise(told)
         position = self.position[...].astype(dtype).reshape(1, -1)
         x = self.embed(self._windows(noisy.astype(dtype)))
         x = x + spread(position, x.shape[0]).reshape(x.shape)
-        x = apply_stack(self.layers, lambda layer, x: layer(x, told), x)
+        patches = x.shape[1]
+        if self.phrases is not None:
+            x = jnp.concatenate([x, self.phrases(text)], axis=1)
+        x = apply_stack(self.layers, lambda layer, x: layer(x, told), x)[:, :patches]
         shift, scale = self.modulation(told)
         return self._pictures(self.output(modulate(x, shift, scale)).astype(noisy.dtype))

@@ -8,7 +8,7 @@ from jax import Array
 
 from jaxphys.guidance.bundled.point_prior import PointCondition, PointPrior, sample_points, to_frame
 from jaxphys.guidance.bundled.priors import load_point_prior
-from jaxphys.guidance.bundled.text_encoder import object_embedding
+from jaxphys.guidance.bundled.text_encoder import prompt_embeddings
 from jaxphys.guidance.diffusion.score_distillation import (
     Distillation,
     DistillationConfig,
@@ -32,7 +32,7 @@ def point_distillation(
         points: (N, 3) centres *in the prior's object frame* (centred, z up, front +x, longest side
             1): undo any placement of the object first.
         colours: (N, 3) in [0, 1].
-        text: (D,) unit embedding of the prompt.
+        text: (R, D) embeddings of the prompt, see `prompt_embeddings`.
     """
     samples, text = to_frame(points, colours)[None], text[None]
     told, untold = PointCondition(text), PointCondition(jnp.zeros_like(text))
@@ -42,7 +42,7 @@ def point_distillation(
 
 
 class PointGuide(NamedTuple):
-    """The bundled point prior and the prompt's embedding (D,)."""
+    """The bundled point prior and the prompt's embeddings (R, D)."""
 
     prior: PointPrior
     text: Array
@@ -57,4 +57,5 @@ class PointGuide(NamedTuple):
 
 def bundled_shape_guide(prompt: str) -> PointGuide:
     """The point prior that comes with the package, as `bundled_image_guide`."""
-    return PointGuide(load_point_prior()[0], object_embedding(prompt))
+    prior = load_point_prior()[0]
+    return PointGuide(prior, prompt_embeddings(prompt, prior.config.phrases))

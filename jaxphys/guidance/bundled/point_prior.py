@@ -17,6 +17,7 @@ from jax import Array
 from jaxphys.guidance.bundled.adaptive import (
     AdaptiveLayer,
     Modulation,
+    PhraseTokens,
     SquaredPerceptron,
     TrainableLinear,
     apply_stack,
@@ -35,9 +36,10 @@ _FREQUENCIES = 4
 
 @dataclass(frozen=True)
 class PointPriorConfig:
-    """Sizes of the network and the frame of its data."""
+    """Sizes of the network and the frame of its data. `phrases` are read beside the object."""
 
     text: int = 384
+    phrases: int = 0
     width: int = 128
     latents: int = 64
     latent_width: int = 192
@@ -53,7 +55,8 @@ class PointPriorConfig:
 
 
 class PointCondition(NamedTuple):
-    """text: (B, text) unit sentence embedding, zeros for any text."""
+    """text: (B, 1 + phrases, text) unit embeddings of the object and of what else is said of it,
+    zeros where nothing is."""
 
     text: Array
 
@@ -112,6 +115,8 @@ class PointPrior(nnx.Module):
         self.latents = nnx.Param(jax.random.normal(rngs.params(), (config.latents, wide)))
         self.time = SquaredPerceptron(128, wide, wide, rngs=rngs)
         self.text = TrainableLinear(config.text, wide, rngs=rngs)
+        rows = 1 + config.phrases
+        self.phrases = PhraseTokens(config.text, rows, wide, rngs=rngs) if config.phrases else None
         self.mix = SquaredPerceptron(wide, wide, wide, rngs=rngs)
         self.blocks = stack(lambda rngs: _Block(config, rngs=rngs), config.blocks, rngs)
         self.modulation = Modulation(wide, width, config.rank, 2, rngs=rngs)
@@ -127,12 +132,15 @@ class PointPrior(nnx.Module):
         """Predicts what `config.kind` says of `noisy` (B, N, 6) at `time` (B,) in [0, 1]."""
         dtype = jnp.dtype(self.config.dtype)
         told = self.time(time_features(time, 128).astype(dtype))
-        told = told + self.text(jnp.asarray(condition.text, dtype) * self.config.text**0.5)
+        text = jnp.asarray(condition.text, dtype)
+        told = told + self.text(text[:, 0] * self.config.text**0.5)
         told = told + self.mix(normalise(told))
         told = normalise(told)
         points = self.embed(self._features(noisy).astype(dtype))
         latents = spread(self.latents[...].astype(dtype).reshape(1, -1), noisy.shape[0])
         latents = latents.reshape(noisy.shape[0], *self.latents.shape)
+        if self.phrases is not None:
+            latents = jnp.concatenate([latents, self.phrases(text)], axis=1)
         points, _ = apply_stack(
             self.blocks, lambda block, streams: block(*streams, told), (points, latents)
         )
@@ -165,7 +173,7 @@ def sample_points(
     count: int = 2048,
     config: SamplingConfig = SamplingConfig(),
 ) -> tuple[Array, Array]:
-    """Draws coloured clouds for (B, D) text embeddings, the same ones for the same key.
+    """Draws coloured clouds for (B, R, D) text embeddings, the same ones for the same key.
 
     Returns points (B, count, 3) in the object frame (centred, z up, front +x, longest side about 1)
     and colours (B, count, 3) in [0, 1].

@@ -17,7 +17,7 @@ from jax import Array
 from jaxphys import weights
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.bundled.quantise import Packed, unpack
-from jaxphys.guidance.guides import object_of
+from jaxphys.guidance.guides import phrases_of
 
 if TYPE_CHECKING:
     from tokenizers import Tokenizer  # slow to import, and not needed by all
@@ -181,6 +181,9 @@ def load_text_encoder() -> TextEncoder:
     return from_arrays(arrays)
 
 
-def object_embedding(prompt: str) -> Array:
-    """(384,) float32: the embedding of the object that a refined prompt names."""
-    return jnp.asarray(load_text_encoder()([object_of(prompt)])[0], jnp.float32)
+def prompt_embeddings(prompt: str, phrases: int) -> Array:
+    """(1 + phrases, 384) float32: unit embeddings of the object that a refined prompt names and of
+    its other phrases, see `phrases_of`; zeros where there are no more.
+    """
+    found = load_text_encoder()(phrases_of(prompt, phrases))
+    return jnp.zeros((1 + phrases, WIDTH), jnp.float32).at[: len(found)].set(found)

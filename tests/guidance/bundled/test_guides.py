@@ -20,7 +20,7 @@ def test_image_distillation_reaches_pictures_only():
     prior = PixelPrior(config, rngs=nnx.Rngs(0))
     rng = np.random.default_rng(0)
     images = jnp.asarray(rng.uniform(size=(2, 16, 16, 3)), jnp.float32)
-    text = jnp.ones((2, 12), jnp.float32) / 12**0.5
+    text = jnp.ones((2, 1, 12), jnp.float32) / 12**0.5
     view = jnp.asarray(view_features(jnp.array([0.1, 2.0]), jnp.array([0.3, 0.3])), jnp.float32)
 
     def loss(images, text):
@@ -50,7 +50,7 @@ def test_point_distillation_reaches_points_and_colours_only():
     rng = np.random.default_rng(0)
     points = jnp.asarray(rng.uniform(-0.5, 0.5, (40, 3)), jnp.float32)
     colours = jnp.asarray(rng.uniform(0, 1, (40, 3)), jnp.float32)
-    text = jnp.ones(12, jnp.float32) / 12**0.5
+    text = jnp.ones((1, 12), jnp.float32) / 12**0.5
 
     def loss(points, colours, text):
         config = DistillationConfig()

@@ -11,7 +11,7 @@ from jaxphys.guidance.views import view_features
 from jaxphys.networks.parameters import named_parameters, with_parameters
 
 TINY = PixelPriorConfig(
-    resolution=16, patch=4, text=12, width=32, layers=2, head_width=16, hidden=48, rank=4
+    resolution=16, patch=4, text=12, phrases=2, width=32, layers=2, head_width=16, hidden=48, rank=4
 )
 
 
@@ -28,7 +28,7 @@ def randomised(module, seed=0):
 def inputs(batch=2, seed=0, text=12):
     rng = np.random.default_rng(seed)
     noisy = jnp.asarray(rng.normal(size=(batch, 16, 16, 3)), jnp.float32)
-    told = jnp.asarray(rng.normal(size=(batch, text)) / text**0.5, jnp.float32)
+    told = jnp.asarray(rng.normal(size=(batch, 3, text)) / text**0.5, jnp.float32)
     view = jnp.asarray(view_features(rng.normal(size=batch), rng.normal(size=batch)), jnp.float32)
     return noisy, jnp.linspace(0.2, 0.8, batch, dtype=jnp.float32), PixelCondition(told, view)
 
@@ -71,6 +71,15 @@ def test_depends_on_all_it_is_told(part):
         "view": lambda: prior(noisy, time, condition._replace(view=-condition.view)),
     }[part]()
     assert np.abs(after - before).max() > 1e-3
+
+
+@pytest.mark.parametrize("row", [0, 1, 2])
+def test_every_phrase_counts(row):
+    prior = randomised(PixelPrior(TINY, rngs=nnx.Rngs(0)))
+    noisy, time, condition = inputs()
+    changed = condition._replace(text=condition.text.at[:, row].set(0.0))
+    difference = prior(noisy, time, changed) - prior(noisy, time, condition)
+    assert np.abs(difference).max() > 1e-3
 
 
 def test_samples_of_a_batch_do_not_mix():

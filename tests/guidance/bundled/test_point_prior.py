@@ -17,6 +17,7 @@ from jaxphys.networks.parameters import named_parameters, with_parameters
 
 TINY = PointPriorConfig(
     text=12,
+    phrases=2,
     width=32,
     latents=8,
     latent_width=32,
@@ -44,7 +45,7 @@ def prior():
 def inputs(count=20, seed=0):
     rng = np.random.default_rng(seed)
     noisy = jnp.asarray(rng.normal(size=(2, count, 6)), jnp.float32)
-    text = jnp.asarray(rng.normal(size=(2, 12)) / 12**0.5, jnp.float32)
+    text = jnp.asarray(rng.normal(size=(2, 3, 12)) / 12**0.5, jnp.float32)
     return noisy, jnp.array([0.3, 0.7], jnp.float32), PointCondition(text)
 
 
@@ -77,6 +78,14 @@ def test_depends_on_time_and_text(prior):
     before = prior(noisy, time, condition)
     assert np.abs(prior(noisy, time + 0.1, condition) - before).max() > 1e-3
     assert np.abs(prior(noisy, time, PointCondition(-condition.text)) - before).max() > 1e-3
+
+
+@pytest.mark.parametrize("row", [0, 1, 2])
+def test_every_phrase_counts(prior, row):
+    noisy, time, condition = inputs()
+    changed = PointCondition(condition.text.at[:, row].set(0.0))
+    difference = prior(noisy, time, changed) - prior(noisy, time, condition)
+    assert np.abs(difference).max() > 1e-3
 
 
 def test_frame_round_trip():

@@ -13,7 +13,7 @@ from jaxphys import weights
 from jaxphys.guidance.bundled.pixel_prior import PixelCondition
 from jaxphys.guidance.bundled.point_prior import PointCondition, to_frame
 from jaxphys.guidance.bundled.priors import load_pixel_prior, load_point_prior
-from jaxphys.guidance.bundled.text_encoder import load_text_encoder
+from jaxphys.guidance.bundled.text_encoder import prompt_embeddings
 from jaxphys.guidance.diffusion.schedule import add_noise, interpret
 from jaxphys.guidance.views import view_features
 
@@ -30,7 +30,7 @@ def objects():
         surface = usual(name, UNSEEN).model.sample(6_000, rng)
         clouds.append(lit_points(surface.points, surface.normals, surface.colours, rng))
     points, _, colours = (np.stack(part) for part in zip(*clouds, strict=True))
-    return points, colours, jnp.asarray(load_text_encoder()([f"a {name}" for name in PRINCIPAL]))
+    return points, colours, jnp.stack([prompt_embeddings(f"a {n}", 0) for n in PRINCIPAL])
 
 
 def errors(prior, clean, time, told, *others):

@@ -10,7 +10,7 @@ from safetensors.numpy import save_file
 from jaxphys import weights
 from jaxphys.core.errors import InputError
 from jaxphys.guidance.bundled.quantise import pack, unpack
-from jaxphys.guidance.bundled.text_encoder import load_text_encoder
+from jaxphys.guidance.bundled.text_encoder import load_text_encoder, prompt_embeddings
 
 # Made with the original float32 weights, rounded to 5 decimals.
 GOLDEN = "text_encoder_golden.json"
@@ -45,6 +45,15 @@ def test_does_not_depend_on_batch_or_padding(golden, embedded):
     together = encoder([longest, *golden["texts"]])[1:]
     np.testing.assert_allclose(together, embedded, atol=2e-5)
     np.testing.assert_array_equal(encoder(golden["texts"]), embedded)
+
+
+def test_a_prompt_is_read_to_its_end():
+    """Its object by all that stands before the first comma, then phrase by phrase, zeros behind."""
+    found = prompt_embeddings("a teapot with a long spout, blue", 4)
+    said = ["a teapot with a long spout", "a teapot", "a long spout", "blue"]
+    np.testing.assert_allclose(found[:4], load_text_encoder()(said), atol=2e-5)
+    np.testing.assert_array_equal(found[4], 0.0)
+    assert found.shape == (5, 384)
 
 
 def test_near_things_are_near():
