@@ -55,12 +55,14 @@ class LatentCondition(NamedTuple):
 
 
 class LatentPrior(nnx.Module):
-    """Denoiser of (B, latents, channels) latents of zero mean and unit variance."""
+    """Denoiser of (B, latents, channels) latents in its frame, where those of all objects have zero
+    mean and unit variance; `mean` and `deviation` lead from there to the autoencoder's."""
 
     def __init__(self, config: LatentPriorConfig, *, rngs: nnx.Rngs):
         self.config = config
         self.schedule = Schedule(config.shift)
-        width = config.width
+        width, shape = config.width, (config.latents, config.channels)
+        self.mean, self.deviation = nnx.Param(jnp.zeros(shape)), nnx.Param(jnp.ones(shape))
         self.embed = TrainableLinear(config.channels, width, rngs=rngs)
         self.place = nnx.Param(jax.random.normal(rngs.params(), (config.latents, width)))
         self.time = SquaredPerceptron(128, width, width, rngs=rngs)
@@ -115,8 +117,8 @@ class LatentSampling:
 def sample_latents(
     prior: LatentPrior, text: Array, key: Array, *, config: LatentSampling = LatentSampling()
 ) -> Array:
-    """Draws latents (B, latents, channels) for (B, R, D) text embeddings, the same ones for the
-    same key."""
+    """Draws latents (B, latents, channels), as the autoencoder has them, for (B, R, D) text
+    embeddings, the same ones for the same key."""
     schedule = prior.schedule
     shape = (text.shape[0], prior.config.latents, prior.config.channels)
     noise = jax.random.normal(key, shape, text.dtype)
@@ -129,4 +131,5 @@ def sample_latents(
         return jnp.clip(clean, -config.limit, config.limit)
 
     times = karras_times(schedule, config.steps, config.largest, config.smallest, config.rho)
-    return sample_heun(denoise, schedule, noise, times.astype(text.dtype))
+    drawn = sample_heun(denoise, schedule, noise, times.astype(text.dtype))
+    return prior.mean[...] + prior.deviation[...] * drawn
