@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.priors.models import build
 from jaxphys import animate, default_scene
 from jaxphys.gaussians import Gaussians, gaussians_from_mesh
 from jaxphys.gaussians.mesh import Mesh
+from jaxphys.library import build
 
 OBJECTS = {
     "jelly": "strawberry",

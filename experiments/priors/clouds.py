@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from experiments.priors.data.splat import bake_light
-from experiments.priors.models import KINDS, captions, make
 from experiments.priors.records import Records, sampler
+from jaxphys.library import KINDS, captions, make
 
 NEIGHBOURS = 8  # whose distance gives the area that a stored point stands for
 

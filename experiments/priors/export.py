@@ -28,7 +28,7 @@ KINDS = {
 }
 LICENCE = "Apache-2.0; trained on CC0, CC-BY 3.0 and MIT data, see the attribution file"
 DATA = (
-    "parametric models of experiments/priors/models, Debian sweethome3d-furniture 1.8 (CC0, CC-BY),"
+    "parametric models of jaxphys/library, Debian sweethome3d-furniture 1.8 (CC0, CC-BY),"
     " @lobehub/fluent-emoji-3d 1.1.0 (MIT; pixel prior only)"
 )
 

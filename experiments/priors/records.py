@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.priors.models import PRINCIPAL
+from jaxphys.library import PRINCIPAL
 
 SHARES = {"parametric": 0.75, "furniture": 0.15, "emoji": 0.1}  # of all draws, of what there is
 PRINCIPAL_WEIGHT = 4.0  # how much more often a principal kind is drawn than another

@@ -16,11 +16,11 @@ from flax import nnx
 
 from experiments.priors.data.pictures import pictures
 from experiments.priors.data.prepare import POINTS, lit_points, random_views
-from experiments.priors.models import usual
 from experiments.scorer.model import WEIGHTS, Scorer, embed, load
 from experiments.scorer.ranking import report, similarities, table
 from experiments.scorer.sentences import MODEL_NAMES, SENTENCES
 from jaxphys.guidance.bundled.text_encoder import load_text_encoder
+from jaxphys.library import usual
 
 GROUND = 0.93  # plain and light
 

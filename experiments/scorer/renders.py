@@ -15,8 +15,8 @@ import numpy as np
 from tqdm import tqdm
 
 from experiments.priors.data.splat import camera_frame, pinholes
-from experiments.priors.models import KINDS, PRINCIPAL, build, captions, usual
 from jaxphys.core.files import atomic_path, write_json
+from jaxphys.library import KINDS, PRINCIPAL, build, captions, usual
 
 RESOLUTION, SUPERSAMPLING = 64, 2
 SAMPLES = 24_000  # surface points of an object

@@ -7,9 +7,9 @@ from experiments.priors.clouds import cloud_source, kind_of
 from experiments.priors.data import splat
 from experiments.priors.data.parametric import prepared
 from experiments.priors.data.pictures import pictures
-from experiments.priors.models import PRINCIPAL
-from experiments.priors.models.palette import golden_directions
 from jaxphys.guidance import views
+from jaxphys.library import PRINCIPAL
+from jaxphys.library.palette import golden_directions
 
 
 def sphere(radius, count):

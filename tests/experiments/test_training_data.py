@@ -5,10 +5,10 @@ import numpy as np
 
 from experiments.priors.clouds import Cloud, winding_inside
 from experiments.priors.fields import field_at, field_targets
-from experiments.priors.models.palette import golden_directions
 from experiments.priors.muon import is_hidden, orthogonalise
 from experiments.priors.phrases import PHRASES, PhraseEncoder, drop_phrases
 from jaxphys.guidance.bundled.shape_autoencoder import AutoencoderConfig
+from jaxphys.library.palette import golden_directions
 
 CONFIG = AutoencoderConfig(thickness=0.01, reach=0.1)
 

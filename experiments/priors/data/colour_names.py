@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experiments.priors.models.palette import COLOURS, article
+from jaxphys.library.palette import COLOURS, article
 
 # Materials look like one of these: a picture does not tell copper from brown.
 NAMES = (

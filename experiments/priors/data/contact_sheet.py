@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from experiments.priors.models import KINDS, build, usual
-from experiments.priors.models.model import Surface
+from jaxphys.library import KINDS, build, usual
+from jaxphys.library.model import Surface
 
 SIDE, ACROSS, POINTS = 128, 6, 14_000
 VIEWS = ((0.55, 0.3), (2.5, 0.45))  # azimuth, elevation [rad]

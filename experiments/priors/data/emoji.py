@@ -16,8 +16,8 @@ from PIL import Image
 from experiments.priors.data.colour_names import colour_captions
 from experiments.priors.data.pictures import straight
 from experiments.priors.data.prepare import Prepared, save
-from experiments.priors.models.palette import article
 from jaxphys.guidance.views import RESOLUTION
+from jaxphys.library.palette import article
 
 GROUPS = {3: "animals", 4: "food", 5: "travel", 6: "activities", 7: "objects"}
 NOT_OBJECTS = {"place-geographic", "sky-weather", "time", "arrow", "place-map"}

@@ -23,7 +23,7 @@ from tqdm import tqdm
 from experiments.priors.data import wavefront
 from experiments.priors.data.colour_names import colour_captions
 from experiments.priors.data.prepare import SAMPLES, prepare, save, stable_hash
-from experiments.priors.models.palette import article
+from jaxphys.library.palette import article
 
 NOT_A_NAME = {"blend swap", "scopia", "kator legaz", "reallusion", ""}
 # Words in a model's own licence note that go beyond attribution.

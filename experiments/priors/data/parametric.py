@@ -23,7 +23,7 @@ from experiments.priors.data.prepare import (
     stable_hash,
     with_pictures,
 )
-from experiments.priors.models import KINDS, PRINCIPAL, build, captions
+from jaxphys.library import KINDS, PRINCIPAL, build, captions
 
 CAPTIONS = 8  # drawn for each object; repetitions are dropped
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from experiments.priors.models.palette import golden_directions
 from jaxphys.guidance import views
+from jaxphys.library.palette import golden_directions
 
 
 def camera_frame(direction: np.ndarray) -> np.ndarray:

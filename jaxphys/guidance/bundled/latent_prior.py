@@ -126,7 +126,8 @@ def sample_latents(
 
     def denoise(noisy: Array, time: Array) -> Array:
         prediction = prior(jnp.tile(noisy, (2, 1, 1)), jnp.tile(time, 2), both)
-        prediction = guided(*jnp.split(prediction, 2), config.guidance)
+        told, untold = jnp.split(prediction, 2)
+        prediction = guided(told, untold, config.guidance)
         clean = interpret(schedule, prior.config.kind, prediction, noisy, time).clean
         return jnp.clip(clean, -config.limit, config.limit)
 

@@ -50,7 +50,7 @@ def _project(network: ShapeAutoencoder, tokens: Array, places: Array):
 
     def onto(chunk: Array):
         def step(chunk: Array, _: None) -> tuple[Array, None]:
-            distance, gradient, _ = _slopes(network, tokens, chunk)
+            distance, gradient, _colour = _slopes(network, tokens, chunk)
             square = jnp.sum(gradient**2, -1, keepdims=True)
             return chunk - distance[:, None] * gradient / jnp.maximum(square, 0.25), None
 
@@ -84,7 +84,7 @@ def surface_points(
     axis = (np.arange(GRID) + 0.5) * size - HALF
     centres = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
     centres = centres.astype(np.float32)
-    found = np.asarray(_grid_distances(network, tokens, _chunks(centres))).reshape(-1)
+    found = np.asarray(_grid_distances(network, tokens, jnp.asarray(_chunks(centres)))).reshape(-1)
     near = np.flatnonzero(np.abs(found[: len(centres)]) < 0.9 * size)
     if len(near) == 0:
         raise InputError("the shape that was drawn has no surface; try another seed")
@@ -94,7 +94,7 @@ def surface_points(
     places = centres[cells] + size * rng.uniform(-0.5, 0.5, (wanted, 3)).astype(np.float32)
     points, left, normals, colours = (
         np.asarray(a).reshape(wanted, -1)
-        for a in _project(network, tokens, places.reshape(-1, CHUNK, 3))
+        for a in _project(network, tokens, jnp.asarray(places.reshape(-1, CHUNK, 3)))
     )
     kept = np.flatnonzero((np.abs(left[:, 0]) < CLOSE) & (np.abs(points).max(1) < HALF))
     if len(kept) == 0:

@@ -8,7 +8,6 @@ from flax import nnx
 
 from experiments.priors.data.pictures import pictures
 from experiments.priors.data.prepare import lit_points
-from experiments.priors.models import PRINCIPAL, usual
 from jaxphys import weights
 from jaxphys.guidance.bundled.pixel_prior import PixelCondition
 from jaxphys.guidance.bundled.point_prior import PointCondition, to_frame
@@ -16,6 +15,7 @@ from jaxphys.guidance.bundled.priors import load_pixel_prior, load_point_prior
 from jaxphys.guidance.bundled.text_encoder import prompt_embeddings
 from jaxphys.guidance.diffusion.schedule import add_noise, interpret
 from jaxphys.guidance.views import view_features
+from jaxphys.library import PRINCIPAL, usual
 
 UNSEEN = 700  # training used the variants 0 to 39
 AZIMUTH, ELEVATION = 0.5, 0.3
