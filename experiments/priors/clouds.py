@@ -2,15 +2,16 @@
 every step, and subsets of the stored objects that are no variants of anything.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from experiments.priors.data.splat import bake_light
 from experiments.priors.records import Records, sampler
+from jaxphys.guidance import views
 from jaxphys.library import KINDS, captions, make
+from jaxphys.library.variation import Given
 
 NEIGHBOURS = 8  # whose distance gives the area that a stored point stands for
 
@@ -35,12 +36,12 @@ def kind_of(item: str) -> str | None:
 
 
 def fresh_cloud(
-    kind: str, points: int, rng: np.random.Generator, given: Mapping[str, str] | None = None
+    kind: str, points: int, rng: np.random.Generator, given: Given | None = None
 ) -> Cloud:
     """A new variant of `kind`; `given` as in `models.make`."""
     built = make(KINDS[kind], rng, given)
     surface = built.model.sample(points, rng)
-    lit = bake_light(surface.colours, surface.normals)
+    lit = views.lit(surface.colours, surface.normals)
     caption = captions(built, 1, rng)[0]
     return Cloud(surface.points, surface.normals, lit, caption, built.model.inside)
 

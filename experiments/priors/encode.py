@@ -20,7 +20,7 @@ from experiments.priors.training import trained
 from jaxphys.core.files import atomic_path
 from jaxphys.guidance.bundled.shape_autoencoder import AutoencoderConfig, ShapeAutoencoder
 
-POINTS = 2048
+POINTS = 4096
 BATCH = 32
 
 

@@ -47,7 +47,8 @@ def generate(
         steps: Steps of optimisation.
         splats: Number of Gaussians at most.
         prior: Judges pictures: bundled, stable-diffusion, stable-diffusion-2.1-base,
-            stable-diffusion-2.1, or a folder in diffusers' layout. Default: bundled.
+            stable-diffusion-2.1, or a folder in diffusers' layout. Or library: no prior, but the
+            parametric model that the words mean; `jaxphys priors` lists them. Default: bundled.
         shape_prior: Judges points: bundled, point-e, or a folder with its files. Default: bundled.
         negative: What Stable Diffusion moves away from.
         refiner: Who refines the sentence. Default: auto, an endpoint if one is set up, else a

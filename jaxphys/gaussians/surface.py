@@ -126,11 +126,30 @@ def sample_surface(mesh: Mesh, count: int, seed: int = 0) -> SurfaceSamples:
         face, weights, colour = _draw(mesh, areas, int(wanted / share) + 1, spacing, random)
     points = np.einsum("nk,nkc->nc", weights, mesh.triangles[face])
     normals = doubled[face] / length[face, None]
+    return _thinned(points, normals, np.clip(colour[:, :3], 0, 1), count, spacing)
+
+
+def even_samples(
+    points: np.ndarray, normals: np.ndarray, colours: np.ndarray, count: int
+) -> SurfaceSamples:
+    """`count` evenly spread ones of dense samples (N, 3) of a surface, N > count, with unit normals
+    and colours in [0, 1]; the two sides of a thin wall do not compete.
+
+    Raises:
+        InputError: `count` is not positive.
+    """
+    if count < 1:
+        raise InputError(f"{count} surface samples: give at least 1")
+    near = min(_NEIGHBOURS, len(points) - 1)
+    radius = cKDTree(points).query(points, k=near + 1)[0][:, -1] if near else np.ones(1)
+    area = np.pi * np.sum(radius**2) / (near + 0.5)
+    return _thinned(points, normals, colours, count, float(np.sqrt(area / count)))
+
+
+def _thinned(points, normals, colours, count: int, spacing: float) -> SurfaceSamples:
     kept = thin(np.concatenate([points, spacing * normals], axis=1), count)
     points, normals = points[kept], normals[kept]
-    return SurfaceSamples(
-        points, normals, np.clip(colour[kept, :3], 0, 1), _spacing(points, normals, spacing)
-    )
+    return SurfaceSamples(points, normals, colours[kept], _spacing(points, normals, spacing))
 
 
 def _spacing(points: np.ndarray, normals: np.ndarray, spacing: float) -> np.ndarray:
@@ -183,9 +202,26 @@ def gaussians_from_mesh(
     Raises:
         InputError: see `sample_surface`; or `thickness` is not positive.
     """
+    return gaussians_from_samples(
+        sample_surface(mesh, count, seed),
+        opacity=opacity,
+        thickness=thickness,
+        degree=degree,
+        dtype=dtype,
+    )
+
+
+def gaussians_from_samples(
+    samples: SurfaceSamples,
+    *,
+    opacity: float = 0.95,
+    thickness: float = 0.1,
+    degree: int = 0,
+    dtype=jnp.float32,
+) -> Gaussians:
+    """A flat Gaussian at each sample, as `gaussians_from_mesh` takes them."""
     if not thickness > 0:
         raise InputError(f"thickness {thickness}: give a positive number")
-    samples = sample_surface(mesh, count, seed)
     sizes = _SIZE_OVER_SPACING * samples.spacing[:, None] * np.array([1, 1, thickness])
     return from_points(
         samples.points.astype(dtype),

@@ -16,6 +16,7 @@ from jaxphys.weights.catalogue import CATALOGUE
 from jaxphys.weights.resolve import locate
 
 BUNDLED = "bundled"
+LIBRARY = "library"
 POINT_E = "point-e"
 STABLE_DIFFUSION = ("stable-diffusion-1.5", "stable-diffusion-2.1-base", "stable-diffusion-2.1")
 
@@ -76,7 +77,8 @@ def published_folder(
     if given in known:
         return locate(known[given], parts=parts or None, half=half)
     if not Path(given).is_dir():
-        valid = nearest(given, [BUNDLED, *known])
+        own = [BUNDLED, LIBRARY] if option == "prior" else [BUNDLED]
+        valid = nearest(given, [*own, *known])
         raise InputError(f"{option} {given}: is no folder and no name of a prior; {valid}")
     lacking = [part for part in parts if not (Path(given) / part).exists()]
     if lacking:
@@ -89,6 +91,10 @@ def published_folder(
 def require(prior: str, shape_prior: str, *, dtype: str = "bfloat16") -> None:
     """Raises `InputError` if the weights of the named priors are not at hand and cannot be had,
     before any work is done."""
+    if prior == LIBRARY:
+        if shape_prior != BUNDLED:
+            raise InputError("shape_prior: is not asked where --prior library makes the object")
+        return
     if prior == BUNDLED:
         require_prior("pixel_prior")
     else:

@@ -39,3 +39,8 @@ def camera_position(azimuth, elevation, distance: float = DISTANCE, xp=np):
     return distance * xp.stack(
         [level * xp.cos(azimuth), level * xp.sin(azimuth), xp.sin(elevation) + 0 * azimuth], -1
     )
+
+
+def lit(colours, normals):
+    """Albedo (N, 3) in [0, 1] under the soft top light, with outward unit normals (N, 3)."""
+    return np.clip(colours * (AMBIENT + DIFFUSE * normals[:, 2:]), 0, 1)

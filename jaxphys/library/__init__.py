@@ -5,7 +5,6 @@ faces +x, centred, longest side of the bounding box 1.
 """
 
 import zlib
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from jaxphys.library import families  # noqa: F401  (declares the kinds)
 from jaxphys.library.kinds import KINDS, Kind
 from jaxphys.library.model import Model, finish
 from jaxphys.library.solids import listed
-from jaxphys.library.variation import Choice, choose, options_of, paints
+from jaxphys.library.variation import Choice, Given, choose, options_of, paints, pairs
 from jaxphys.library.words import caption
 
 __all__ = ["KINDS", "PRINCIPAL", "Built", "Kind", "Sample", "build", "captions", "sample", "usual"]
@@ -52,7 +51,7 @@ class Sample(NamedTuple):
     attributes: dict
 
 
-def make(kind: Kind, rng: np.random.Generator, given: Mapping[str, str] | None = None) -> Built:
+def make(kind: Kind, rng: np.random.Generator, given: Given | None = None) -> Built:
     """A random variant; `given` fixes colours by part and words by option."""
     choice = choose(kind, rng, given)
     parts = {n: listed(s) for n, s in kind.make(options_of(choice), rng).items()}
@@ -68,19 +67,22 @@ def make(kind: Kind, rng: np.random.Generator, given: Mapping[str, str] | None =
     return Built(kind, finish(parts, colours, textures), choice, frozenset(present))
 
 
-def build(name: str, seed: int, given: Mapping[str, str] | None = None) -> Built:
+def build(name: str, seed: int, given: Given | None = None) -> Built:
     """One variant of the kind `name`, the same for the same seed; `given` fixes colours by part and
     words by option, as {"spout": "long", "lid": "red"}."""
     return make(KINDS[name], np.random.default_rng([zlib.crc32(name.encode()), seed]), given)
 
 
-def usual(name: str, seed: int) -> Built:
-    """One variant with the colours that the kind usually has, as captions without colours mean."""
+def usual(name: str, seed: int, given: Given | None = None) -> Built:
+    """One variant with the colours that the kind usually has, as captions without colours mean,
+    but for what is `given`."""
     kind = KINDS[name]
-    given = {part: kind.colours[part][0] for part in kind.colours if part not in kind.same}
+    fixed = {part: (kind.colours[part][0],) for part in kind.colours if part not in kind.same}
+    for part, word in pairs(given):
+        fixed[part] = (*fixed.get(part, ()), word)
     for number in range(seed, seed + 1_000_000, 10_000):
-        if not build(name, number).choice.unusual & set(kind.same):
-            return build(name, number, given)
+        if not build(name, number).choice.unusual & set(kind.same) - set(fixed):
+            return build(name, number, fixed)
     raise AssertionError(f"no variant of {name} with its usual colours")
 
 

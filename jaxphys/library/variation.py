@@ -55,21 +55,30 @@ class Choice:
     values: Mapping[str, float | str | int | bool]
 
 
-def choose(kind: Kind, rng: np.random.Generator, given: Mapping[str, str] | None = None) -> Choice:
+Given = Mapping[str, str | tuple[str, ...]]
+"""Colours of parts and words of options by name; several of what is both, ("long", "blue")."""
+
+
+def pairs(given: Given | None) -> list[tuple[str, str]]:
+    """Each name with each of its words, in order: later ones count."""
+    several = {n: (w,) if isinstance(w, str) else w for n, w in (given or {}).items()}
+    return [(name, word) for name, words in several.items() for word in words]
+
+
+def choose(kind: Kind, rng: np.random.Generator, given: Given | None = None) -> Choice:
     """A random variant that is not held out; `given` fixes colours of parts and words of options
     (held out or not, as a test or a user asks).
 
     Raises KeyError for a part, option or word that the kind does not have.
     """
-    given = dict(given or {})
     colours, unusual = choose_colours(kind, rng)
     words = choose_words(kind, rng)
-    for name, word in given.items():
+    for name, word in pairs(given):
         if name in kind.options and word in kind.options[name].values:
             words[name] = word
         elif name in kind.colours and word in COLOURS:
             colours[name] = word
-            if word not in kind.colours[name]:
+            if word not in kind.colours[name] or name in kind.same:
                 unusual.add(name)
         else:
             raise KeyError(f"{kind.name} has no {name} {word!r}")

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import os
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -61,7 +62,8 @@ def generate(
 ) -> Path:
     """Makes an object from a sentence and moves it; returns the directory.
 
-    Besides what `animate` writes, the directory gets `prompt.json` (see `Refinement`).
+    Besides what `animate` writes, the directory gets `prompt.json`: see `Refinement`, and under
+    `made_by` the priors, or the parametric model and what of it was chosen.
 
     Args:
         prompt: the sentence; None takes the one in the scene.
@@ -74,20 +76,30 @@ def generate(
     Raises:
         InputError, SimulationError, KeyboardInterrupt: as `animate`; or an unusable prompt.
     """
-    from jaxphys.guidance import choice
+    from jaxphys.guidance import choice, library
 
     timing = Timing()
     scene, generation = _asked(prompt, scene, changes)
     validate(scene)
     choice.require(generation.prior, generation.shape_prior, dtype=generation.precision)
+    if generation.prior == choice.LIBRARY:
+        library.require_known(generation.prompt)
+    elif generation.prior == choice.BUNDLED and not library.is_known(generation.prompt):
+        print(f"jaxphys: {library.unknown(generation.prompt)}", file=sys.stderr)
     # Everything that is asked for decides the result, the refiner too.
     identity = fingerprint(b"generate", _text(scene))
     names = [PROMPT, *products(scene, save_splats)]
     with run_folder(out, identity, names, inputs=inputs, overwrite=overwrite) as folder:
         refinement = _refined(generation, folder, identity)
-        write_json(folder.file(PROMPT), dataclasses.asdict(refinement))
         with timing.stage("generate"):
-            gaussians = _gaussians(refinement, scene, generation, folder, progress)
+            if generation.prior == choice.LIBRARY:
+                count = generation.splats or library.COUNT
+                gaussians, made = library.library_object(generation.prompt, scene.seed, count)
+            else:
+                gaussians = _gaussians(refinement, scene, generation, folder, progress)
+                made = {"shape_prior": generation.shape_prior}
+        made = {"prior": generation.prior, **made}
+        write_json(folder.file(PROMPT), {**dataclasses.asdict(refinement), "made_by": made})
         return animate_in(
             folder,
             scene,

@@ -187,7 +187,8 @@ class Generation(Checked):
         steps: of optimisation; null: the default of the prior.
         splats: number of Gaussians at most; null: the default of the prior.
         prior: the 2D prior: "bundled", a name of `jaxphys weights list` such as
-            "stable-diffusion", or a folder in diffusers' layout.
+            "stable-diffusion", or a folder in diffusers' layout; or "library", the parametric model
+            that the sentence names instead of any prior.
         shape_prior: the 3D prior: "bundled", "point-e", or a folder with Point-E's files.
         negative: what the 2D prior moves away from; bundled priors do not read it.
         refiner: who refines the sentence; "auto" asks an endpoint, then a local model, then rules.

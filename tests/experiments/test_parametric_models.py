@@ -53,7 +53,7 @@ def test_pictures_show_the_side_they_are_taken_from():
 
 def test_light_comes_from_above():
     white = np.ones((2, 3))
-    lit = splat.bake_light(white, np.array([[0, 0, 1.0], [0, 0, -1.0]]))
+    lit = views.lit(white, np.array([[0, 0, 1.0], [0, 0, -1.0]]))
     np.testing.assert_allclose(
         lit[:, 0], [views.AMBIENT + views.DIFFUSE, views.AMBIENT - views.DIFFUSE]
     )

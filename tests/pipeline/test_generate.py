@@ -195,3 +195,27 @@ def test_an_optimisation_goes_on_where_it_was_interrupted(calls, tmp_path, monke
     flip(next(path for path in sorted((steps / "5").rglob("*")) if path.is_file()))
     generate("a can", SCENE, tmp_path, **options)
     assert seen == [0, 4] and not (tmp_path / "checkpoint").exists()
+
+
+def test_the_library_makes_the_object_without_a_prior(calls, tmp_path):
+    made = generate("a blue mug", SCENE, tmp_path, prior="library", splats=300)
+    prompt = json.loads((made / "prompt.json").read_text())
+    assert not calls
+    assert prompt["original"] == "a blue mug"
+    assert prompt["made_by"]["prior"] == "library" and prompt["made_by"]["kind"] == "mug"
+    assert prompt["made_by"]["colours"]["body"] == "blue"
+
+
+def test_what_the_library_lacks_is_said_before_any_work(calls, tmp_path):
+    with pytest.raises(InputError, match=r"pangolin.*nearest are .*--prior stable-diffusion"):
+        generate("a pangolin", SCENE, tmp_path / "new", prior="library")
+    assert not (tmp_path / "new").exists()
+    with pytest.raises(InputError, match="shape_prior"):
+        generate("a mug", SCENE, tmp_path / "new", prior="library", shape_prior="point-e")
+
+
+def test_what_the_priors_never_saw_is_told_and_tried(calls, tmp_path, capsys):
+    generate("a pangolin", SCENE, tmp_path)
+    assert "pangolin" in capsys.readouterr().err and len(calls) == 1
+    generate("a can", SCENE, tmp_path, overwrite=True)
+    assert capsys.readouterr().err == ""

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.priors.data.pictures import pictures
-from experiments.priors.data.splat import bake_light, even_subset, visible_surface
+from experiments.priors.data.splat import even_subset, visible_surface
 from jaxphys.core.files import atomic_path
 from jaxphys.guidance import views
 
@@ -46,7 +46,7 @@ def lit_points(points, normals, colours, rng) -> tuple[np.ndarray, np.ndarray, n
     """
     points, normals, colours = (np.asarray(a, np.float32) for a in (points, normals, colours))
     chosen = even_subset(points, POINTS, rng)
-    lit = bake_light(colours[chosen], normals[chosen])
+    lit = views.lit(colours[chosen], normals[chosen])
     return (
         points[chosen].astype(np.float16),
         np.rint(127 * normals[chosen]).astype(np.int8),

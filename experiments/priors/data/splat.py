@@ -69,11 +69,6 @@ def visible_surface(points, normals, *, directions: int = 24, resolution: int = 
     return seen > 0, normals * np.where(side == 0, 1, side)
 
 
-def bake_light(colours, normals):
-    """Colours (N, 3) in [0, 1] under the soft top light that all training data share."""
-    return np.clip(colours * (views.AMBIENT + views.DIFFUSE * normals[:, 2:]), 0, 1)
-
-
 def neighbours(image: np.ndarray) -> np.ndarray:
     """The eight neighbours (8, H, W, ...) of every pixel; those past the border repeat the edge."""
     height, width = image.shape[:2]

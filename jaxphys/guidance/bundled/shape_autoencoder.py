@@ -1,8 +1,10 @@
 """Coloured surfaces as a few latent vectors, and back: a distance and a colour at any place.
 
-Cross-attention both ways, as 3DShape2VecSet (Zhang et al. 2023): latents read a cloud of oriented
-coloured points; any place reads the latents and is told how far from the surface it is and which
-colour the surface has near it. The result is a continuous surface without scatter.
+A transformer over the blocks of a cube. An encoder's token reads the oriented coloured points of
+its block as small cells; a decoder's writes its block's part of a finer grid of features, and what
+lies between eight cells is read off them by a small perceptron. The result is a continuous surface
+without scatter. (Latents that read whole clouds by attention, as 3DShape2VecSet's, must learn first
+where they are: with the same computation they stayed at blobs.)
 """
 
 from dataclasses import dataclass
@@ -21,27 +23,42 @@ from jaxphys.guidance.bundled.adaptive import (
     spread,
 )
 
+READ = 10  # of a cell: whether it holds points, their mean offset, normal and colour
+
 
 @dataclass(frozen=True)
 class AutoencoderConfig:
-    """Sizes of the network and the frame of its field.
+    """Sizes of the network and the frame of its field, lengths in object lengths.
 
+    side: blocks a side of the cube; cells: cells a side of a block; features: of a cell.
+    half: half the side of the cube, which holds all there is and a little around it.
     thickness: half of what thin sheets are given, and by how much every surface is raised, so that
-    whatever has a surface has an inside. reach: distances are told up to this. Object lengths.
+    whatever has a surface has an inside. reach: distances are told up to this.
     """
 
     width: int = 192
-    latents: int = 64
-    channels: int = 16
+    side: int = 4
+    channels: int = 32
+    cells: int = 10
+    features: int = 8
     head_width: int = 64
     hidden: int = 512
     reading: int = 2
-    thinking: int = 3
-    asking: int = 2
-    frequencies: int = 7
+    writing: int = 3
+    answer: int = 64
+    half: float = 0.54
     thickness: float = 0.006
     reach: float = 0.1
     dtype: str = "float32"
+
+    @property
+    def latents(self) -> int:
+        return self.side**3
+
+    @property
+    def grid(self) -> int:
+        """Cells a side of the cube."""
+        return self.side * self.cells
 
 
 class Field(NamedTuple):
@@ -53,23 +70,17 @@ class Field(NamedTuple):
 
 
 class Layer(nnx.Module):
-    """Pre-norm transformer layer: attention to `context`, then a perceptron."""
+    """Pre-norm transformer layer."""
 
-    def __init__(self, width: int, heads: int, head_width: int, hidden: int, *, rngs: nnx.Rngs):
+    def __init__(self, width: int, head_width: int, hidden: int, *, rngs: nnx.Rngs):
+        heads = width // head_width
         self.attention = NormalisedAttention(width, width, heads, head_width, rngs=rngs)
         self.perceptron = SquaredPerceptron(width, hidden, width, rngs=rngs)
 
-    def __call__(self, x: Array, context: Array | None = None) -> Array:
+    def __call__(self, x: Array) -> Array:
         inner = normalise(x)
-        x = x + self.attention(inner, inner if context is None else normalise(context))
+        x = x + self.attention(inner, inner)
         return x + self.perceptron(normalise(x))
-
-
-def positional(places: Array, frequencies: int) -> Array:
-    """Fourier features (Tancik et al. 2020) of (..., 3) places in [-1, 1] beside themselves."""
-    rates = 0.5 * jnp.pi * 2.0 ** jnp.arange(frequencies, dtype=places.dtype)
-    phase = (places[..., None] * rates).reshape(*places.shape[:-1], 3 * frequencies)
-    return jnp.concatenate([places, jnp.sin(phase), jnp.cos(phase)], axis=-1)
 
 
 class ShapeAutoencoder(nnx.Module):
@@ -77,57 +88,84 @@ class ShapeAutoencoder(nnx.Module):
 
     def __init__(self, config: AutoencoderConfig, *, rngs: nnx.Rngs):
         self.config = config
-        width, place = config.width, 3 + 6 * config.frequencies
+        width, block = config.width, config.cells**3
 
-        def layer(hidden: int, heads: int, head_width: int) -> Layer:
-            return Layer(width, heads, head_width, hidden, rngs=rngs)
+        def layers(count: int) -> nnx.List:
+            made = (Layer(width, config.head_width, config.hidden, rngs=rngs) for _ in range(count))
+            return nnx.List(made)
 
-        def thinker() -> Layer:
-            return layer(config.hidden, width // config.head_width, config.head_width)
+        def places() -> nnx.Param:
+            return nnx.Param(jax.random.normal(rngs.params(), (config.latents, width)))
 
-        self.embed = TrainableLinear(place + 6, width, rngs=rngs)
-        self.queries = nnx.Param(jax.random.normal(rngs.params(), (config.latents, width)))
-        self.read = nnx.List(layer(config.hidden, 4, 32) for _ in range(config.reading))
-        self.gather = nnx.List(thinker() for _ in range(config.reading))
+        self.embed, self.read_place = TrainableLinear(READ * block, width, rngs=rngs), places()
+        self.read = layers(config.reading)
         self.narrow = TrainableLinear(width, config.channels, rngs=rngs)
-        self.widen = TrainableLinear(config.channels, width, rngs=rngs)
-        self.place = nnx.Param(jax.random.normal(rngs.params(), (config.latents, width)))
-        self.think = nnx.List(thinker() for _ in range(config.thinking))
-        self.ask = TrainableLinear(place, width, rngs=rngs)
-        self.answer = nnx.List(layer(2 * width, 4, 32) for _ in range(config.asking))
-        self.output = TrainableLinear(width, 4, rngs=rngs)
+        self.widen, self.write_place = TrainableLinear(config.channels, width, rngs=rngs), places()
+        self.write = layers(config.writing)
+        self.unfolded = TrainableLinear(width, config.features * block, rngs=rngs)
+        self.answer = SquaredPerceptron(config.features, config.answer, config.answer, rngs=rngs)
+        self.output = SquaredPerceptron(config.answer, config.answer, 4, rngs=rngs)
 
-    def _rows(self, rows: nnx.Param, batch: int, dtype) -> Array:
-        flat = spread(rows[...].astype(dtype).reshape(1, -1), batch)
-        return flat.reshape(batch, *rows.shape)
+    def _placed(self, x: Array, place: nnx.Param) -> Array:
+        rows = spread(place[...].astype(x.dtype).reshape(1, -1), x.shape[0])
+        return x + rows.reshape(x.shape)
+
+    def _in_cells(self, points: Array) -> Array:
+        """Places of the object frame in units of cells, from 0 to `grid`."""
+        return (points + self.config.half) * (self.config.grid / (2 * self.config.half))
+
+    def _cells(self, points: Array, normals: Array, colours: Array) -> Array:
+        """What the cells hold: (B, latents, READ cells^3), block by block."""
+        side, cells, grid = self.config.side, self.config.cells, self.config.grid
+        at = self._in_cells(points)
+        cell = jnp.clip(jnp.floor(at), 0, grid - 1)
+        x, y, z = jnp.moveaxis(cell.astype(jnp.int32), -1, 0)
+        one = jnp.ones_like(points[..., :1])
+        held = jnp.concatenate([one, at - cell - 0.5, normals, 2 * colours - 1], -1)
+        batch = jnp.broadcast_to(jnp.arange(points.shape[0])[:, None], x.shape)
+        total = jnp.zeros((points.shape[0], grid**3, READ), points.dtype)
+        total = total.at[batch, (x * grid + y) * grid + z].add(held)
+        mean = total / jnp.maximum(total[..., :1], 1)
+        blocks = mean.reshape(-1, side, cells, side, cells, side, cells, READ)
+        blocks = blocks.transpose(0, 1, 3, 5, 2, 4, 6, 7)
+        return blocks.reshape(-1, side**3, READ * cells**3)
 
     def encode(self, points: Array, normals: Array, colours: Array) -> Array:
         """Latents (B, latents, channels) of clouds (B, N, 3): points in the object frame, outward
         unit normals, colours in [0, 1]. The order of points does not matter."""
-        dtype = jnp.dtype(self.config.dtype)
-        features = positional(2.0 * points, self.config.frequencies)
-        features = jnp.concatenate([features, normals, 2.0 * colours - 1.0], -1).astype(dtype)
-        tokens = self.embed(features)
-        x = self._rows(self.queries, points.shape[0], dtype)
-        for read, gather in zip(self.read, self.gather, strict=True):
-            x = gather(read(x, tokens))
+        held = self._cells(points, normals, colours).astype(jnp.dtype(self.config.dtype))
+        x = self._placed(4.0 * self.embed(held), self.read_place)
+        for layer in self.read:
+            x = layer(x)
         return normalise(self.narrow(normalise(x))).astype(points.dtype)
 
     def unfold(self, latents: Array) -> Array:
-        """What places read: tokens (B, latents, width). Once for any number of `field` calls."""
-        dtype = jnp.dtype(self.config.dtype)
-        x = self.widen(latents.astype(dtype)) + self._rows(self.place, latents.shape[0], dtype)
-        for layer in self.think:
+        """What places read: features (B, grid^3, features). Once for any number of `field`s."""
+        side, cells = self.config.side, self.config.cells
+        x = self.widen(latents.astype(jnp.dtype(self.config.dtype)))
+        x = self._placed(x, self.write_place)
+        for layer in self.write:
             x = layer(x)
-        return x
+        blocks = self.unfolded(normalise(x)).astype(latents.dtype)
+        blocks = blocks.reshape(-1, side, side, side, cells, cells, cells, self.config.features)
+        blocks = blocks.transpose(0, 1, 4, 2, 5, 3, 6, 7)
+        return blocks.reshape(-1, self.config.grid**3, self.config.features)
 
-    def field(self, tokens: Array, places: Array) -> Field:
-        """The field at places (B, Q, 3) of the object frame, each by itself."""
-        dtype = jnp.dtype(self.config.dtype)
-        x = self.ask(positional(2.0 * places, self.config.frequencies).astype(dtype))
-        for layer in self.answer:
-            x = layer(x, tokens)
-        found = self.output(normalise(x)).astype(places.dtype)
+    def field(self, features: Array, places: Array) -> Field:
+        """The field at places (B, Q, 3) of the object frame, of features that `unfold` gave."""
+        grid = self.config.grid
+        at = jnp.clip(self._in_cells(places) - 0.5, 0.0, grid - 1.0)
+        low = jnp.clip(jnp.floor(at), 0, grid - 2)
+        part = at - low
+        x, y, z = jnp.moveaxis(low.astype(jnp.int32), -1, 0)
+        mixed = jnp.zeros((*places.shape[:2], self.config.features), places.dtype)
+        for i in (0, 1):
+            for j in (0, 1):
+                for k in (0, 1):
+                    row = ((x + i) * grid + y + j) * grid + z + k
+                    near = jnp.abs(jnp.array([1 - i, 1 - j, 1 - k]) - part).prod(-1, keepdims=True)
+                    mixed += near * jnp.take_along_axis(features, row[..., None], axis=1)
+        found = self.output(normalise(self.answer(mixed)))
         distance = self.config.reach * jnp.tanh(found[..., 0])
         return Field(distance, jax.nn.sigmoid(2.0 * found[..., 1:]))
 
