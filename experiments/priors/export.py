@@ -18,13 +18,18 @@ from safetensors.numpy import save_file
 
 from experiments.priors.training import averaged, config_of, lines_of
 from jaxphys import weights
+from jaxphys.guidance.bundled.latent_prior import LatentPrior, LatentPriorConfig
 from jaxphys.guidance.bundled.pixel_prior import PixelPrior, PixelPriorConfig
 from jaxphys.guidance.bundled.point_prior import PointPrior, PointPriorConfig
+from jaxphys.guidance.bundled.shape_autoencoder import AutoencoderConfig, ShapeAutoencoder
+from jaxphys.library import KINDS as KINDS_DRAWN
 from jaxphys.networks.parameters import named_parameters
 
 KINDS = {
     "point_prior": (PointPrior, PointPriorConfig, "train_points"),
     "pixel_prior": (PixelPrior, PixelPriorConfig, "train_pixels"),
+    "shape_autoencoder": (ShapeAutoencoder, AutoencoderConfig, "train_autoencoder"),
+    "latent_prior": (LatentPrior, LatentPriorConfig, "train_latents"),
 }
 LICENCE = "Apache-2.0; trained on CC0, CC-BY 3.0 and MIT data, see the attribution file"
 DATA = (
@@ -90,8 +95,8 @@ def main() -> None:
             pieces=pieces(lines, step),
             seed=trained["seed"],
             held_out_step=reports[-1]["step"],
-            held_out=reports[-1]["held_out"],
-            held_out_no_text=reports[-1]["held_out_no_text"],
+            **{key: value for key, value in reports[-1].items() if key.startswith("held_out")},
+            kinds=sorted(KINDS_DRAWN),
         )
     print(json.dumps(entry, indent=2))
 

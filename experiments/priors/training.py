@@ -210,4 +210,6 @@ def train(task: Task, options: argparse.Namespace) -> None:
             checkpoints.save(int(state.step), by_name(state))
         if losses and not stopping():
             report(losses, time.monotonic() - last_report, time.process_time() - busy)
+        if stopping():
+            raise SystemExit(f"{run}: stopped at step {int(state.step)}; the same command goes on")
     log.close()

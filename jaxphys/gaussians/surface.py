@@ -130,10 +130,15 @@ def sample_surface(mesh: Mesh, count: int, seed: int = 0) -> SurfaceSamples:
 
 
 def even_samples(
-    points: np.ndarray, normals: np.ndarray, colours: np.ndarray, count: int
+    points: np.ndarray,
+    normals: np.ndarray,
+    colours: np.ndarray,
+    count: int,
+    *,
+    oriented: bool = True,
 ) -> SurfaceSamples:
     """`count` evenly spread ones of dense samples (N, 3) of a surface, N > count, with unit normals
-    and colours in [0, 1]; the two sides of a thin wall do not compete.
+    and colours in [0, 1]; the two sides of a thin wall do not compete, if normals are `oriented`.
 
     Raises:
         InputError: `count` is not positive.
@@ -143,25 +148,28 @@ def even_samples(
     near = min(_NEIGHBOURS, len(points) - 1)
     radius = cKDTree(points).query(points, k=near + 1)[0][:, -1] if near else np.ones(1)
     area = np.pi * np.sum(radius**2) / (near + 0.5)
-    return _thinned(points, normals, colours, count, float(np.sqrt(area / count)))
+    return _thinned(points, normals, colours, count, float(np.sqrt(area / count)), oriented)
 
 
-def _thinned(points, normals, colours, count: int, spacing: float) -> SurfaceSamples:
-    kept = thin(np.concatenate([points, spacing * normals], axis=1), count)
-    points, normals = points[kept], normals[kept]
-    return SurfaceSamples(points, normals, colours[kept], _spacing(points, normals, spacing))
+def _thinned(
+    points, normals, colours, count: int, spacing: float, oriented: bool = True
+) -> SurfaceSamples:
+    features = np.concatenate([points, spacing * normals], axis=1) if oriented else points
+    kept = thin(features, count)
+    return SurfaceSamples(
+        points[kept], normals[kept], colours[kept], _spacing(features[kept], spacing)
+    )
 
 
-def _spacing(points: np.ndarray, normals: np.ndarray, spacing: float) -> np.ndarray:
+def _spacing(features: np.ndarray, spacing: float) -> np.ndarray:
     """Side of the square that each sample has to itself, from the distance to the sixth neighbour.
 
     A disc of that radius holds six and a half samples. Where the surface is thinner than a few
     spacings the disc is cut; the bound keeps such sizes near the mean.
     """
-    neighbours = min(_NEIGHBOURS, len(points) - 1)
+    neighbours = min(_NEIGHBOURS, len(features) - 1)
     if neighbours < 1:
-        return np.full(len(points), spacing)
-    features = np.concatenate([points, spacing * normals], axis=1)
+        return np.full(len(features), spacing)
     distance = cKDTree(features).query(features, k=neighbours + 1)[0][:, -1]
     return np.clip(distance * np.sqrt(np.pi / (neighbours + 0.5)), 0.5 * spacing, 1.5 * spacing)
 

@@ -151,8 +151,8 @@ class ShapeAutoencoder(nnx.Module):
         blocks = blocks.transpose(0, 1, 4, 2, 5, 3, 6, 7)
         return blocks.reshape(-1, self.config.grid**3, self.config.features)
 
-    def field(self, features: Array, places: Array) -> Field:
-        """The field at places (B, Q, 3) of the object frame, of features that `unfold` gave."""
+    def _between(self, features: Array, places: Array) -> Array:
+        """Trilinear mean (B, Q, features) of the eight cells around places (B, Q, 3)."""
         grid = self.config.grid
         at = jnp.clip(self._in_cells(places) - 0.5, 0.0, grid - 1.0)
         low = jnp.clip(jnp.floor(at), 0, grid - 2)
@@ -165,6 +165,11 @@ class ShapeAutoencoder(nnx.Module):
                     row = ((x + i) * grid + y + j) * grid + z + k
                     near = jnp.abs(jnp.array([1 - i, 1 - j, 1 - k]) - part).prod(-1, keepdims=True)
                     mixed += near * jnp.take_along_axis(features, row[..., None], axis=1)
+        return mixed
+
+    def field(self, features: Array, places: Array) -> Field:
+        """The field at places (B, Q, 3) of the object frame, of features that `unfold` gave."""
+        mixed = self._between(features, places)
         found = self.output(normalise(self.answer(mixed)))
         distance = self.config.reach * jnp.tanh(found[..., 0])
         return Field(distance, jax.nn.sigmoid(2.0 * found[..., 1:]))
