@@ -23,6 +23,7 @@ from jaxphys.networks.parameters import with_parameters
 
 DENSE = 8192  # points of a cloud that distances are measured to
 NEAR = 0.03  # colours count where the surface is as near as that, object lengths
+WITHOUT_NORMALS = 0.25  # share of clouds read without, as guidance has them
 NOISE = 0.1  # of the latents in training, whose mean square is 1: near ones decode alike
 SHOWN, SHOWN_POINTS = 12, 3000
 
@@ -68,6 +69,8 @@ def main() -> None:
             places, distance, colour = field_targets(cloud, options.places, rng, config)
             at = rng.permutation(len(cloud.points))[: options.points]
             read = {name: getattr(cloud, name)[at] for name in ("points", "normals", "colours")}
+            if rng.random() < WITHOUT_NORMALS:
+                read["normals"] = np.zeros_like(read["normals"])
             rows.append(read | {"places": places, "distance": distance, "colour": colour})
         return {key: np.stack([row[key] for row in rows]).astype(np.float32) for key in rows[0]}
 

@@ -23,6 +23,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.gaussians.density import DensityConfig, carry_moments, control_density, with_capacity
 from jaxphys.gaussians.gaussians import Gaussians, from_points, select
 from jaxphys.gaussians.harmonics import dc_to_rgb
+from jaxphys.gaussians.surface import gaussians_from_samples
 from jaxphys.guidance import views
 from jaxphys.guidance.bundled.pixel_guide import bundled_image_guide
 from jaxphys.guidance.bundled.point_guide import bundled_shape_guide
@@ -30,6 +31,7 @@ from jaxphys.guidance.clouds import even_subset
 from jaxphys.guidance.diffusion.score_distillation import DistillationConfig
 from jaxphys.guidance.guides import Guides
 from jaxphys.guidance.pictures import neighbour_sizes, room_for_pairs, view_picture
+from jaxphys.guidance.surfaces import surface_of_cloud
 from jaxphys.render import next_capacity
 
 
@@ -38,10 +40,12 @@ class OptimiseConfig:
     """Choices of `text_to_gaussians`; lengths in object lengths.
 
     Attributes:
-        count: Gaussians drawn from the 3D prior.
+        count: Gaussians that distillation starts from, drawn from the 3D prior.
         oversampling: so many times `count` are drawn, for `clouds.even_subset` to choose from.
+        cloud, surface: of an object that is not distilled, the points drawn and the flat Gaussians
+            that are laid on the surface through the better half of them.
         room: capacity for density control, as a multiple of `count`.
-        steps: of distillation; 0 leaves the sampled cloud as it is.
+        steps: of distillation; with 0 the surface of the sampled cloud is the result.
         views: pictures a step.
         image, shape: of the two distillations.
         image_weight, shape_weight, regular_weight: of the losses.
@@ -54,6 +58,8 @@ class OptimiseConfig:
 
     count: int = 2048
     oversampling: float = 3.0
+    cloud: int = 16_384
+    surface: int = 30_000
     room: float = 1.25
     steps: int = 160
     views: int = 4
@@ -103,6 +109,14 @@ def initial_gaussians(guides: Guides, key: Array, config: OptimiseConfig) -> Gau
     points, colours = points[kept], colours[kept]
     sizes = neighbour_sizes(points, config.size, config.largest)
     return from_points(points, colours, sizes, opacity=config.opacity)
+
+
+def surface_gaussians(guides: Guides, key: Array, config: OptimiseConfig) -> Gaussians:
+    """Flat Gaussians on the surface of a cloud drawn from the 3D prior, without distillation."""
+    points, colours = (np.asarray(a) for a in guides.shape.sample(key, config.cloud))
+    kept = even_subset(points, -(-len(points) // 2))
+    samples = surface_of_cloud(points[kept], colours[kept], config.surface)
+    return gaussians_from_samples(samples)
 
 
 def _transform(config: OptimiseConfig) -> optax.GradientTransformation:
@@ -275,6 +289,8 @@ def text_to_gaussians(
     if guides is None:
         guides = Guides(bundled_image_guide(prompt), bundled_shape_guide(prompt))
     cloud_key, step_key = jax.random.split(jax.random.key(seed))
+    if config.steps == 0:
+        return surface_gaussians(guides, cloud_key, config)
     state = resume
     if state is None:
         state = start(initial_gaussians(guides, cloud_key, config), config)

@@ -56,17 +56,15 @@ def _noun(head: str) -> tuple[Kind, str] | None:
     for kind in KINDS.values():
         for noun in kind.nouns:
             plain = _plain(noun)
+            stem = plain.removesuffix("s").removesuffix("y")
+            if stem.split(" with ")[0] not in head:
+                continue
             # The flowers of a vase with flowers may be blue ones.
-            pattern = _singular(plain).replace(r"\ with\ ", r"\ with\ (?:[\w-]+ )*")
+            pattern = re.escape(stem).replace(r"\ with\ ", r"\ with\ (?:[\w-]+ )*")
             match = re.search(rf"\b{pattern}(?:s|es|y|ies)?\b{FOLLOWS}", head)
             if match and match.start() < end and (best is None or len(plain) > best[0]):
                 best = len(plain), kind, head[: match.start()].strip()
     return best and best[1:]
-
-
-def _singular(name: str) -> str:
-    """A pattern for what the forms of a name begin with."""
-    return re.escape(name.removesuffix("s").removesuffix("y"))
 
 
 def _part(kind: Kind, phrase: str) -> str | None:

@@ -149,7 +149,8 @@ def _optimise(
     """Runs `text_to_gaussians`, going on from a checkpoint and saving one when interrupted."""
     from jaxphys.guidance import choice, optimise
 
-    given = {"steps": generation.steps, "count": generation.splats}
+    splats = generation.splats
+    given = {"steps": generation.steps, "count": splats, "surface": splats}
     changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     usual = choice.settings(generation.prior, generation.shape_prior)
     config = dataclasses.replace(usual, **changes)

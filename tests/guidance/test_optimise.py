@@ -1,3 +1,5 @@
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -5,7 +7,7 @@ import pytest
 from flax import nnx
 
 from jaxphys.core.errors import InputError
-from jaxphys.gaussians.gaussians import from_points
+from jaxphys.gaussians.gaussians import from_points, scales
 from jaxphys.guidance.bundled.pixel_guide import PixelGuide
 from jaxphys.guidance.bundled.pixel_prior import PixelPrior, PixelPriorConfig
 from jaxphys.guidance.bundled.point_guide import PointGuide
@@ -60,6 +62,23 @@ def test_resumed_run_ends_in_the_same_bytes(guides):
     assert np.abs(after.means - before.means).max() > 1e-4
     assert after.means.dtype == jnp.float32
     assert after.count == 36 and int(through.alive.sum()) >= 24
+
+
+def test_without_distillation_the_surface_is_the_result(guides):
+    class Drawn(NamedTuple):
+        """Draws a noisy ball."""
+
+        def sample(self, key, count):
+            normals = jax.random.normal(key, (count, 3))
+            normals /= jnp.linalg.norm(normals, axis=1, keepdims=True)
+            return 0.4 * normals, jnp.full((count, 3), 0.7)
+
+    config = OptimiseConfig(steps=0, cloud=1200, surface=900)
+    found = text_to_gaussians("a ball", config=config, guides=guides._replace(shape=Drawn()))
+    radius = np.linalg.norm(found.means, axis=1)
+    assert found.count == 900 and np.abs(radius - 0.4).max() < 0.01
+    size = np.asarray(scales(found))
+    assert (size[:, 2] < 0.2 * size[:, 0]).all()
 
 
 def test_front_is_seen_from_azimuth_zero():

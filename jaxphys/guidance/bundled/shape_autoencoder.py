@@ -132,7 +132,7 @@ class ShapeAutoencoder(nnx.Module):
 
     def encode(self, points: Array, normals: Array, colours: Array) -> Array:
         """Latents (B, latents, channels) of clouds (B, N, 3): points in the object frame, outward
-        unit normals, colours in [0, 1]. The order of points does not matter."""
+        unit normals (zeros if unknown), colours in [0, 1]. The order of points does not matter."""
         held = self._cells(points, normals, colours).astype(jnp.dtype(self.config.dtype))
         x = self._placed(4.0 * self.embed(held), self.read_place)
         for layer in self.read:
