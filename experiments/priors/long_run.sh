@@ -13,13 +13,12 @@ export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 python=.venv/bin/python
 
 $python -m experiments.priors.train_autoencoder --data "$folder/prepared" \
-  --run "$folder/runs/autoencoder" --steps "${AUTOENCODER_STEPS:-16000}"
+  --run "$folder/runs/autoencoder"
 if [ ! -e "$folder/runs/latents.npz" ]; then
   $python -m experiments.priors.encode --data "$folder/prepared" \
     --autoencoder "$folder/runs/autoencoder" "$folder/runs/latents.npz"
 fi
 $python -m experiments.priors.train_latents --latents "$folder/runs/latents.npz" \
-  --autoencoder "$folder/runs/autoencoder" --run "$folder/runs/latents" \
-  --steps "${LATENT_STEPS:-12000}"
+  --autoencoder "$folder/runs/autoencoder" --run "$folder/runs/latents"
 $python -m experiments.priors.train_pixels --data "$folder/prepared" \
-  --run "$folder/runs/pixels" --steps "${PIXEL_STEPS:-12000}"
+  --run "$folder/runs/pixels"

@@ -1,10 +1,9 @@
 """Muon (Jordan et al. 2024) for the hidden matrices of a flat dictionary of parameters, else AdamW.
 
-The hidden matrices are those of layers, stacked (layers, inputs, outputs) or in a list, under names
-such as `think/0/perceptron/inner/kernel`. They are orthogonalised in bfloat16, as its authors do.
+The hidden matrices are those of layers, stacked (layers, inputs, outputs) or alone. They are
+orthogonalised in bfloat16, as its authors do.
 """
 
-import re
 from typing import NamedTuple
 
 import jax
@@ -15,6 +14,7 @@ from jax import Array, lax
 from jaxphys.guidance.bundled.adaptive import scores
 
 Parameters = dict[str, Array]
+LARGE = 128  # rows and columns of a hidden matrix that is no part of a stack
 COEFFICIENTS = (3.4445, -4.7750, 2.0315)
 
 
@@ -84,8 +84,10 @@ def muon(rate: optax.Schedule, weight_decay: float) -> optax.GradientTransformat
 
 
 def is_hidden(name: str, value: Array) -> bool:
-    """Whether it is a matrix of a layer or a stack of them."""
-    return value.ndim == 3 or (bool(re.search(r"/\d+/.*/kernel$", name)) and value.ndim == 2)
+    """Whether it is a matrix of a stack of layers, or one that is large both ways. Of a matrix of
+    thousands of inputs a step of Adam's size would change what comes out of it at once.
+    """
+    return value.ndim == 3 or (name.endswith("kernel") and min(value.shape) >= LARGE)
 
 
 def _split(parameters: Parameters) -> tuple[Parameters, Parameters]:

@@ -54,7 +54,8 @@ def loss(network: ShapeAutoencoder, batch: dict[str, Array], key: Array) -> Arra
 
 
 def main() -> None:
-    parser = arguments(__doc__, batch=16, steps=40_000)
+    parser = arguments(__doc__, batch=16, steps=16_000)
+    parser.set_defaults(learning_rate=4e-3)
     parser.add_argument("--points", type=int, default=4096, help="points that are encoded")
     parser.add_argument("--places", type=int, default=2048, help="places asked of each object")
     parser.add_argument("--kinds", nargs="*", help="of these parametric kinds alone")

@@ -54,7 +54,7 @@ def sheet(network: ShapeAutoencoder, text: np.ndarray, seed: int):
 
 
 def main() -> None:
-    parser = arguments(__doc__, batch=64, steps=60_000)
+    parser = arguments(__doc__, batch=64, steps=12_000)
     parser.add_argument("--latents", type=Path, required=True, help="what encode.py made")
     parser.add_argument("--autoencoder", type=Path, required=True, help="folder of its run")
     options = parser.parse_args()

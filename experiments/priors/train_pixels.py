@@ -78,7 +78,7 @@ def sheet(text: np.ndarray, seed: int):
 
 
 def main() -> None:
-    parser = arguments(__doc__, batch=64, steps=40_000)
+    parser = arguments(__doc__, batch=64, steps=12_000)
     options = parser.parse_args()
     data = records.load(options.data)
     weight = data.weights()
