@@ -13,7 +13,9 @@ from jaxphys.weights.verify import Verdict
 
 BUNDLED = {
     "pixel_prior": "the bundled 2D prior",
-    "point_prior": "the bundled 3D prior",
+    "point_prior": "the bundled 3D prior over points",
+    "shape_autoencoder": "surfaces from latents, for the bundled 3D prior",
+    "latent_prior": "the bundled 3D prior over latents of surfaces",
     "text_encoder": "sentences to vectors, for the bundled priors",
 }
 

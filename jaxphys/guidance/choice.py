@@ -6,8 +6,8 @@ from pathlib import Path
 
 from jaxphys.core.errors import InputError, nearest
 from jaxphys.guidance.bundled.pixel_guide import bundled_image_guide
-from jaxphys.guidance.bundled.point_guide import bundled_shape_guide
 from jaxphys.guidance.bundled.priors import require_prior
+from jaxphys.guidance.bundled.shape_guide import bundled_shape_guide, shape_weights
 from jaxphys.guidance.diffusion.score_distillation import DistillationConfig
 from jaxphys.guidance.guides import Guides, ImageGuide, ShapeGuide
 from jaxphys.guidance.optimise import OptimiseConfig
@@ -100,7 +100,8 @@ def require(prior: str, shape_prior: str, *, dtype: str = "bfloat16") -> None:
     else:
         image_folder(prior, dtype=dtype)
     if shape_prior == BUNDLED:
-        require_prior("point_prior")
+        for name in shape_weights():
+            require_prior(name)
     else:
         shape_folders(shape_prior)
 

@@ -26,7 +26,7 @@ from jaxphys.gaussians.harmonics import dc_to_rgb
 from jaxphys.gaussians.surface import gaussians_from_samples
 from jaxphys.guidance import views
 from jaxphys.guidance.bundled.pixel_guide import bundled_image_guide
-from jaxphys.guidance.bundled.point_guide import bundled_shape_guide
+from jaxphys.guidance.bundled.shape_guide import bundled_shape_guide
 from jaxphys.guidance.clouds import even_subset
 from jaxphys.guidance.diffusion.score_distillation import DistillationConfig
 from jaxphys.guidance.guides import Guides

@@ -55,7 +55,7 @@ class PointGuide(NamedTuple):
         return point_distillation(self.prior, points, colours, self.text, key, config, progress)
 
 
-def bundled_shape_guide(prompt: str) -> PointGuide:
+def bundled_point_guide(prompt: str) -> PointGuide:
     """The point prior that comes with the package, as `bundled_image_guide`."""
     prior = load_point_prior()[0]
     return PointGuide(prior, prompt_embeddings(prompt, prior.config.phrases))

@@ -10,8 +10,10 @@ from flax import nnx
 
 from jaxphys import weights
 from jaxphys.core.errors import InputError
+from jaxphys.guidance.bundled.latent_prior import LatentPrior, LatentPriorConfig
 from jaxphys.guidance.bundled.pixel_prior import PixelPrior, PixelPriorConfig
 from jaxphys.guidance.bundled.point_prior import PointPrior, PointPriorConfig
+from jaxphys.guidance.bundled.shape_autoencoder import AutoencoderConfig, ShapeAutoencoder
 from jaxphys.networks.parameters import named_parameters, with_parameters
 
 Module = TypeVar("Module", bound=nnx.Module)
@@ -48,6 +50,18 @@ def load_point_prior() -> tuple[PointPrior, dict[str, Any]]:
     Raises InputError if the file is missing, damaged, or does not fit its entry.
     """
     return _load("point_prior", PointPrior, PointPriorConfig)
+
+
+@cache
+def load_shape_autoencoder() -> tuple[ShapeAutoencoder, dict[str, Any]]:
+    """The bundled autoencoder of surfaces, as `load_point_prior`."""
+    return _load("shape_autoencoder", ShapeAutoencoder, AutoencoderConfig)
+
+
+@cache
+def load_latent_prior() -> tuple[LatentPrior, dict[str, Any]]:
+    """The bundled prior over its latents, as `load_point_prior`."""
+    return _load("latent_prior", LatentPrior, LatentPriorConfig)
 
 
 @cache

@@ -38,13 +38,14 @@ def cloud(count=60, seed=0):
 
 def test_latents_are_of_unit_size_whatever_the_order_of_points(network):
     read = cloud()
-    latents = network.encode(*read)
+    encode = nnx.jit(ShapeAutoencoder.encode)
+    latents = encode(network, *read)
     assert latents.shape == (2, 8, 4)
     np.testing.assert_allclose(jnp.mean(latents**2, -1), 1, atol=1e-3)
     order = np.random.default_rng(1).permutation(60)
-    again = network.encode(*(array[:, order] for array in read))
+    again = encode(network, *(array[:, order] for array in read))
     np.testing.assert_allclose(again, latents, atol=1e-5)
-    other = network.encode(read[0], read[1], 1 - read[2])
+    other = encode(network, read[0], read[1], 1 - read[2])
     assert np.abs(other - latents).max() > 1e-3
 
 
@@ -53,7 +54,7 @@ def test_a_point_is_found_in_its_cell(network):
     points = jnp.array([[[0.13, -0.55, -0.1], [0.13, -0.55, -0.1]]], jnp.float32)
     normals = jnp.array([[[0, 0, 1.0], [0, 1.0, 0]]], jnp.float32)
     colours = jnp.array([[[1.0, 0.5, 0], [1.0, 0.5, 1.0]]], jnp.float32)
-    held = np.asarray(network._cells(points, normals, colours)).reshape(8, 27, READ)
+    held = np.array(network._cells(points, normals, colours)).reshape(8, 27, READ)
     block, cell = 4, (0 * 3 + 0) * 3 + 2  # (1, 0, 0) of 2x2x2, (0, 0, 2) of 3x3x3
     offset = [0.65 - 0.5, 0.25 - 0.5, 0.5 - 0.5]  # (place + 0.6) / 0.2, less its whole part
     wanted = [1, *offset, 0, 0.5, 0.5, 1, 0, 0]
@@ -68,19 +69,21 @@ def test_between_cells_features_are_linear(network):
     ramp = np.random.default_rng(2).normal(size=(3, 5))
     features = jnp.asarray(middles @ ramp, jnp.float32)[None]
     places = np.random.default_rng(3).uniform(-0.5, 0.5, (1, 40, 3))
-    found = network._between(features, jnp.asarray(places, jnp.float32))
-    np.testing.assert_allclose(found, places @ ramp, atol=1e-5)
+    between = nnx.jit(ShapeAutoencoder._between)
+    places = np.concatenate([places, np.full((1, 1, 3), 5.0)], 1)
+    found = between(network, features, jnp.asarray(places, jnp.float32))[0]
+    np.testing.assert_allclose(found[:-1], places[0, :-1] @ ramp, atol=1e-5)
     # Beyond the outermost middles the value there is kept.
-    far = network._between(features, jnp.full((1, 1, 3), 5.0))
-    np.testing.assert_allclose(far[0, 0], np.full(3, 0.5) @ ramp, atol=1e-5)
+    np.testing.assert_allclose(found[-1], np.full(3, 0.5) @ ramp, atol=1e-5)
 
 
 def test_blocks_are_laid_out_as_they_are_read(network):
     """What a latent unfolds to stands in its own block."""
-    latents = network.encode(*cloud())[:1]
+    latents = jnp.asarray(np.random.default_rng(5).normal(size=(1, 8, 4)), jnp.float32)
     first = nnx.clone(network)
     first.write = nnx.List([])  # without attention, blocks do not know of one another
-    changed = np.abs(first.unfold(latents.at[:, 4].add(1.0)) - first.unfold(latents))
+    unfold = nnx.jit(ShapeAutoencoder.unfold)
+    changed = np.abs(unfold(first, latents.at[:, 4].add(1.0)) - unfold(first, latents))
     changed = np.array(changed).reshape(6, 6, 6, 5).max(-1)
     assert changed[3:, :3, :3].min() > 0
     changed[3:, :3, :3] = 0
@@ -88,13 +91,15 @@ def test_blocks_are_laid_out_as_they_are_read(network):
 
 
 def test_fields_are_in_range_and_each_place_by_itself(network):
-    latents = network.encode(*cloud())
+    latents = jnp.asarray(np.random.default_rng(5).normal(size=(2, 8, 4)), jnp.float32)
     places = jnp.asarray(np.random.default_rng(4).uniform(-0.5, 0.5, (2, 30, 3)), jnp.float32)
-    field = network.decode(latents, places)
+    decode = nnx.jit(ShapeAutoencoder.decode)
+    field = decode(network, latents, places)
     assert field.distance.shape == (2, 30) and field.colour.shape == (2, 30, 3)
     assert np.abs(field.distance).max() <= TINY.reach
     assert field.colour.min() >= 0 and field.colour.max() <= 1
-    part = network.decode(latents, places[:, 10:20])
+    part = decode(network, latents, places[:, 10:20])
     np.testing.assert_allclose(part.distance, field.distance[:, 10:20], atol=1e-6)
-    towards = jax.grad(lambda p: network.decode(latents, p).distance.sum())(places)
+    slope = jax.jit(jax.grad(lambda p: network.decode(latents, p).distance.sum()))
+    towards = slope(places)
     assert np.abs(towards).max() > 0 and np.isfinite(towards).all()
