@@ -103,8 +103,7 @@ class ShapeAutoencoder(nnx.Module):
         self.widen, self.write_place = TrainableLinear(config.channels, width, rngs=rngs), places()
         self.write = layers(config.writing)
         self.unfolded = TrainableLinear(width, config.features * block, rngs=rngs)
-        self.answer = SquaredPerceptron(config.features, config.answer, config.answer, rngs=rngs)
-        self.output = SquaredPerceptron(config.answer, config.answer, 4, rngs=rngs)
+        self.output = SquaredPerceptron(config.features, config.answer, 4, rngs=rngs, zero=True)
 
     def _placed(self, x: Array, place: nnx.Param) -> Array:
         rows = spread(place[...].astype(x.dtype).reshape(1, -1), x.shape[0])
@@ -170,7 +169,8 @@ class ShapeAutoencoder(nnx.Module):
     def field(self, features: Array, places: Array) -> Field:
         """The field at places (B, Q, 3) of the object frame, of features that `unfold` gave."""
         mixed = self._between(features, places)
-        found = self.output(normalise(self.answer(mixed)))
+        # Four of the features are the answer to begin with, and the perceptron what they lack.
+        found = mixed[..., :4] + self.output(mixed)
         distance = self.config.reach * jnp.tanh(found[..., 0])
         return Field(distance, jax.nn.sigmoid(2.0 * found[..., 1:]))
 
