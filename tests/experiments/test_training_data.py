@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
+from experiments.priors import judge
 from experiments.priors.clouds import Cloud, winding_inside
 from experiments.priors.fields import field_at, field_targets
 from experiments.priors.muon import is_hidden, orthogonalise
@@ -93,3 +94,12 @@ def test_hidden_matrices_are_large_or_of_stacked_layers():
     x = np.random.default_rng(0).normal(size=(1, 6, 9))
     values = np.linalg.svd(np.asarray(orthogonalise(jnp.asarray(x)))[0], compute_uv=False)
     assert values.min() > 0.5 and values.max() < 1.4
+
+
+def test_distance_to_a_moved_and_repainted_cloud():
+    rng = np.random.default_rng(0)
+    one = judge.Cloud(rng.uniform(size=(300, 3)), np.full((300, 3), 0.25))
+    other = judge.Cloud(one.points + np.array([0, 0, 1e-4]), np.full((300, 3), 0.75))
+    found = judge.distance(one, other)
+    np.testing.assert_allclose([found.shape, found.colour], [1e-4, 0.5], rtol=1e-6)
+    assert judge.nearest(one, [other, one]).shape == 0
