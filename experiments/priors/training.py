@@ -165,6 +165,8 @@ def train(task: Task, options: argparse.Namespace) -> None:
     state = TrainState(parameters, parameters, transform.init(parameters), jnp.zeros((), jnp.int32))
     checkpoints = checkpoints_of(run, parameters)
     if newest := checkpoints.newest():
+        if by_name(state).keys() - newest[1].keys():
+            raise SystemExit(f"{run}: was trained by another optimiser; take a new folder")
         state = from_names(state, newest[1])
     step = make_step(task, transform, options)
     log = (run / "log.jsonl").open("a", buffering=1)
