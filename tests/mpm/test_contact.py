@@ -260,7 +260,7 @@ def landed():
 
     @jax.jit
     def mean(point, velocity, friction):
-        plane = model.boundaries[0].with_(point=point, velocity=velocity, friction=friction)
+        plane = model.boundaries[0].changed(point=point, velocity=velocity, friction=friction)
         end = jax.lax.scan(
             lambda s, _: (
                 step(config, dataclasses.replace(model, boundaries=(plane,)), s, dt),
@@ -345,10 +345,10 @@ def test_friction_of_zero_leaves_no_trace():
 
     (without, plane), (with_some, _) = roots(0.0), roots(0.4)
     assert with_some == without + 1
-    with pytest.raises(InputError, match="friction: is 0 in this plane"):
-        plane.with_(friction=jnp.array(0.2))
+    with pytest.raises(InputError, match="friction: was built as zero"):
+        plane.changed(friction=jnp.array(0.2))
     with pytest.raises(InputError, match="did you mean 'friction'"):
-        plane.with_(fricton=0.2)
+        plane.changed(fricton=0.2)
 
 
 def test_a_state_without_room_for_slip_is_refused():

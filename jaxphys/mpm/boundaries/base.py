@@ -130,23 +130,6 @@ class Boundary(Checked):
             wanted = f"{shape[0]} numbers" if shape else "one number"
             raise InputError(f"{entry.name}: expected {wanted}, got shape {value.shape}")
 
-    def with_(self, **numbers) -> Self:
-        """The same prepared boundary with other numbers, which may be traced and differentiated.
-
-        Raises:
-            InputError: a name that is none of its numbers, or that of one whose code is left out.
-        """
-        known = [f.name for f in fields(self) if not ({"static", "keys"} & set(f.metadata))]
-        for name in numbers:
-            if name not in known:
-                raise InputError(f"{self.type} has no number {name!r}; {nearest(name, known)}")
-            if getattr(self, name) is None:
-                raise InputError(
-                    f"{name}: is 0 in this {self.type}, so that its code is left out; declare it "
-                    "above 0 to change or differentiate it"
-                )
-        return replace(self, **{k: jnp.asarray(v) for k, v in numbers.items()})
-
     def acts_in(self, stage: str) -> bool:
         """Whether a step calls the method called `stage`."""
         return getattr(type(self), stage) is not getattr(Boundary, stage)
