@@ -69,10 +69,10 @@ def model_and_state(case: dict, devices: int | None = None):
     """(config, model, state) of a `block_case` in float32, on all devices or `devices` of them."""
     import jax.numpy as jnp
 
-    from jaxphys.mpm import elasticity, plasticity
     from jaxphys.mpm.grid import Grid
     from jaxphys.mpm.loop.placement import suited
     from jaxphys.mpm.loop.window import windowed
+    from jaxphys.mpm.materials import elasticity, plasticity
     from jaxphys.mpm.state import Config, Model, initial_state
 
     count = len(case["position"])

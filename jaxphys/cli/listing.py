@@ -3,8 +3,8 @@
 import json
 import textwrap
 
-from jaxphys.mpm.materials import MATERIALS, Material
-from jaxphys.mpm.parameters import ALTERNATIVES, RANGES
+from jaxphys.mpm.materials.catalogue import MATERIALS, Material
+from jaxphys.mpm.materials.parameters import ALTERNATIVES, RANGES
 
 
 def _explained(name: str) -> dict:

@@ -7,7 +7,7 @@ from typing import Any
 
 from jaxphys.core.errors import InputError, one_line
 from jaxphys.core.reading import reading
-from jaxphys.mpm.materials import get_material
+from jaxphys.mpm.materials.catalogue import get_material
 from jaxphys.scene.build import validate
 from jaxphys.scene.defaults import default_scene
 from jaxphys.scene.model_folder import is_trained, splats_in

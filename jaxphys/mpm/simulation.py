@@ -12,10 +12,10 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
-from jaxphys.mpm.materials import check_parameter
+from jaxphys.mpm.materials.catalogue import check_parameter
 from jaxphys.mpm.motion import Frame
 from jaxphys.mpm.state import OK, Config, Model, State
-from jaxphys.mpm.substep import choose_substep
+from jaxphys.mpm.stepping.fixed import choose_substep
 
 
 @partial(

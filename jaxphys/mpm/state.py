@@ -10,8 +10,8 @@ from jax import Array
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.law import Law
 from jaxphys.mpm.loop.placement import Placement
+from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.transfer.stencil import Window
 
 CODES = 8

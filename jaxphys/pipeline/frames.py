@@ -14,10 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jaxphys.mpm.fracture import number_of_pieces
 from jaxphys.mpm.loop.frames import advance_frame
 from jaxphys.mpm.loop.status import check
 from jaxphys.mpm.loop.window import windowed
+from jaxphys.mpm.materials.fracture import number_of_pieces
 from jaxphys.mpm.motion import Frame, Motion, join
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import LEFT_WINDOW, OK, State

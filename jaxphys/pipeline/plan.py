@@ -20,8 +20,8 @@ from jaxphys.gaussians.gaussians import Gaussians, from_points, transform
 from jaxphys.mpm.loop.chunks import cuts
 from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.loop.window import windowed
-from jaxphys.mpm.materials import MATERIALS
-from jaxphys.mpm.time_step import largest_stable_dt
+from jaxphys.mpm.materials.catalogue import MATERIALS
+from jaxphys.mpm.stepping.bounds import largest_stable_dt
 from jaxphys.pipeline.film import picture, surroundings_of
 from jaxphys.render.camera import orbit
 from jaxphys.scene.build import Built, build

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jaxphys.mpm.elasticity import HENCKY
+from jaxphys.mpm.materials.elasticity import HENCKY
 from jaxphys.problems.discrete import Discretisation, Room, discretise, held_up_to, steps_for
 from jaxphys.problems.problem import Problem
 

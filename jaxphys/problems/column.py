@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from jaxphys.mpm.elasticity import HENCKY
+from jaxphys.mpm.materials.elasticity import HENCKY
 from jaxphys.problems.bar import line_points
 from jaxphys.problems.discrete import Discretisation, Room, discretise, held_up_to, steps_for
 from jaxphys.problems.problem import Problem

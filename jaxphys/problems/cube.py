@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jaxphys.mpm.elasticity import NEO_HOOKEAN
+from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
 from jaxphys.problems.discrete import BodyForce, Discretisation, Room, discretise, steps_for
 from jaxphys.problems.problem import Problem
 

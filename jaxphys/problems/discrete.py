@@ -19,8 +19,8 @@ from jax import Array
 from jaxphys.core import algebra
 from jaxphys.mpm.boundaries import Boundary, Plane, Setting
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.law import Law
 from jaxphys.mpm.loop.rollout import step
+from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.state import Config, Model, State, initial_state
 from jaxphys.problems.kinematics import deformation_gradient, velocity
 

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jaxphys.mpm.elasticity import HENCKY
+from jaxphys.mpm.materials.elasticity import HENCKY
 from jaxphys.mpm.state import State
 from jaxphys.problems.discrete import Discretisation, Room, discretise, held_up_to
 from jaxphys.problems.problem import Problem

@@ -16,10 +16,15 @@ from jaxphys.mpm.boundaries import Damping, Setting, prepare
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.placement import suited
 from jaxphys.mpm.loop.sorting import cell_order, inverse_order
-from jaxphys.mpm.materials import assemble_parameters, get_material, material_values, overridden
+from jaxphys.mpm.materials.catalogue import (
+    assemble_parameters,
+    get_material,
+    material_values,
+    overridden,
+)
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, State, initial_state
-from jaxphys.mpm.substep import choose_substep
+from jaxphys.mpm.stepping.fixed import choose_substep
 from jaxphys.scene.look import Look, look_of
 from jaxphys.scene.place import Placed, place
 from jaxphys.scene.scene import Object, Scene

@@ -1,14 +1,14 @@
 """One scene for each material that shows at a glance what it is made of.
 
 Placed in metres for an object about one metre high, whatever the grid's spacing: a finer grid shows
-the same scene. The material's parameters are its defaults (`jaxphys.mpm.materials`), soft enough
+the same scene. The material's parameters are its defaults (`materials.catalogue`), soft enough
 that a second of motion takes some hundred steps on the coarse grid.
 """
 
 from collections.abc import Callable
 
 from jaxphys.mpm.boundaries import Plane, Vector, Walls
-from jaxphys.mpm.materials import get_material
+from jaxphys.mpm.materials.catalogue import get_material
 from jaxphys.scene.scene import Domain, Filling, Ground, Object, Region, Rotation, Scene
 
 SIDE = 2.5

@@ -15,7 +15,7 @@ from typing import Any, Literal
 from jaxphys.core.dataclass_reader import from_json
 from jaxphys.core.errors import InputError, nearest, one_line, shown
 from jaxphys.mpm.boundaries import Vector
-from jaxphys.mpm.plasticity import UNIAXIAL
+from jaxphys.mpm.materials.plasticity import UNIAXIAL
 from jaxphys.scene.model_folder import FiledCamera
 from jaxphys.scene.physgaussian_camera import seen_from
 from jaxphys.scene.physgaussian_config import Config, ParticleFilling

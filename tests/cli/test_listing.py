@@ -1,8 +1,8 @@
 import json
 
 from jaxphys.cli.listing import materials_text
-from jaxphys.mpm.materials import MATERIALS
-from jaxphys.mpm.parameters import RANGES
+from jaxphys.mpm.materials.catalogue import MATERIALS
+from jaxphys.mpm.materials.parameters import RANGES
 
 
 def test_every_parameter_is_explained_where_it_is_listed():

@@ -3,8 +3,8 @@
 import jax.numpy as jnp
 import numpy as np
 
-from jaxphys.mpm.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, initial_state
 

@@ -2,9 +2,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxphys.mpm.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.rollout import step
+from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.state import Config, Model, initial_state
 from jaxphys.mpm.transfer import scatter, stencil
 

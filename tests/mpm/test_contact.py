@@ -11,10 +11,10 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.boundaries import Box, Damping, Plane, Setting, prepare
-from jaxphys.mpm.elasticity import ELASTIC_PARAMETERS, NEO_HOOKEAN
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.law import Law
 from jaxphys.mpm.loop.rollout import step
+from jaxphys.mpm.materials.elasticity import ELASTIC_PARAMETERS, NEO_HOOKEAN
+from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.state import Config, Model, initial_state
 
 from .cases import count_primitives

@@ -26,7 +26,7 @@ from jaxphys.mpm.loop.adjoint import Plain
 from jaxphys.mpm.loop.chunks import cut, cuts, joined, numbers, orders
 from jaxphys.mpm.loop.placement import Placement, cache_bytes, suited
 from jaxphys.mpm.loop.rollout import rollout
-from jaxphys.mpm.materials import MATERIALS, material_values
+from jaxphys.mpm.materials.catalogue import MATERIALS, material_values
 from jaxphys.mpm.state import OK, STEP_TOO_LARGE, UNSTABLE_STEP, Config, Model, initial_state
 
 from .cases import block

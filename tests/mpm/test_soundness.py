@@ -10,11 +10,11 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.spectral import log_stretches
-from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN, lame
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.rollout import _choose, rollout, step
 from jaxphys.mpm.loop.status import SimulationError, check
-from jaxphys.mpm.materials import MATERIALS
+from jaxphys.mpm.materials.catalogue import MATERIALS
+from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN, lame
 from jaxphys.mpm.state import (
     COLLAPSED,
     INVERTED,
@@ -25,7 +25,7 @@ from jaxphys.mpm.state import (
     Model,
     initial_state,
 )
-from jaxphys.mpm.time_step import isolated_bound, present_bounds
+from jaxphys.mpm.stepping.bounds import isolated_bound, present_bounds
 
 from .cases import block, count_primitives
 from .test_step import remembering

@@ -8,10 +8,10 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.boundaries import Box, Damping, Setting, Translate, prepare
-from jaxphys.mpm.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.law import Law
 from jaxphys.mpm.loop.rollout import step
+from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
+from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.state import (
     LEFT_GRID,
     LEFT_WINDOW,

@@ -12,7 +12,7 @@ import pytest
 
 from jaxphys.core.rotations import axis_angle_to_matrix
 from jaxphys.gaussians.gaussians import Gaussians, from_points, select
-from jaxphys.mpm.materials import MATERIALS
+from jaxphys.mpm.materials.catalogue import MATERIALS
 from jaxphys.pipeline.frames import simulate
 from jaxphys.scene import Domain, Filling, Object, Plane, Rotation, Scene
 from jaxphys.scene.build import build

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxphys.mpm.time_step import largest_stable_dt
+from jaxphys.mpm.stepping.bounds import largest_stable_dt
 from jaxphys.problems.bar import Bar, free_bar, held_bar, line_room
 from jaxphys.problems.column import Column, sudden_column
 from jaxphys.problems.cube import Cube, cube_room, free_cube

@@ -6,10 +6,10 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
-from jaxphys.mpm.fracture import FRACTURE, number_of_pieces
 from jaxphys.mpm.loop.frames import advance_frame
 from jaxphys.mpm.loop.status import check
-from jaxphys.mpm.materials import MATERIALS
+from jaxphys.mpm.materials.catalogue import MATERIALS
+from jaxphys.mpm.materials.fracture import FRACTURE, number_of_pieces
 from jaxphys.scene import scene_from_json, to_json
 from jaxphys.scene.build import build
 from jaxphys.scene.defaults import SPACING, default_scene

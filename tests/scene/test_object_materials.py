@@ -7,7 +7,7 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
-from jaxphys.mpm.plasticity import (
+from jaxphys.mpm.materials.plasticity import (
     PERFECT_VON_MISES,
     UNCORRECTED_DRUCKER_PRAGER,
     VON_MISES,

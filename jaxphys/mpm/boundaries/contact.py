@@ -35,8 +35,8 @@ from jaxphys.mpm.boundaries.base import (
     Setting,
     array_of,
 )
-from jaxphys.mpm.elasticity import lame
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.materials.elasticity import lame
 from jaxphys.mpm.state import Model
 
 Surface = Literal["sticky", "slip", "separate"]

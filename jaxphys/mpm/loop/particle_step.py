@@ -14,7 +14,7 @@ from jaxphys.core import algebra, compensated
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.law import Law
+from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.state import Residual
 
 

@@ -15,7 +15,6 @@ from jaxphys.core import compensated
 from jaxphys.core.errors import InputError
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
-from jaxphys.mpm.elasticity import with_moduli
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.adjoint import Adjoint, Plain, repeat
 from jaxphys.mpm.loop.chunks import cut, cuts, joined, numbers, orders
@@ -24,8 +23,9 @@ from jaxphys.mpm.loop.particle_step import Flow, Matter, Particles, Shared, velo
 from jaxphys.mpm.loop.placement import gathered
 from jaxphys.mpm.loop.status import MOST_PARTICLES, after_step
 from jaxphys.mpm.loop.step_check import checked
+from jaxphys.mpm.materials.elasticity import with_moduli
 from jaxphys.mpm.state import OK, Config, Model, Residual, State, Status
-from jaxphys.mpm.time_step import contact_bound
+from jaxphys.mpm.stepping.bounds import contact_bound
 
 PLAIN = Plain()
 
@@ -58,7 +58,7 @@ def rollout(
     not numbers. `steps` may be traced, so that one program serves any number of them; then there is
     no reverse mode.
 
-    Unless `Config.check_step` is off, a `dt` beyond `time_step.hard_limit` of the state fails at
+    Unless `Config.check_step` is off, a `dt` beyond `bounds.hard_limit` of the state fails at
     once.
 
     Raises:

@@ -11,7 +11,7 @@ from jaxphys.mpm.loop.particle_step import Matter
 from jaxphys.mpm.loop.placement import AXIS, spread
 from jaxphys.mpm.loop.status import NO_FAILURE, least
 from jaxphys.mpm.state import OK, UNSTABLE_STEP, Config, Status
-from jaxphys.mpm.time_step import hard_limit
+from jaxphys.mpm.stepping.bounds import hard_limit
 
 
 def checked(

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.elasticity import lame
-from jaxphys.mpm.plasticity import (
+from jaxphys.mpm.materials.elasticity import lame
+from jaxphys.mpm.materials.plasticity import (
     DRUCKER_PRAGER,
     PERFECT_VON_MISES,
     UNCORRECTED_DRUCKER_PRAGER,

@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.plasticity import triaxial_friction_angle
+from jaxphys.mpm.materials.plasticity import triaxial_friction_angle
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
-from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
-from jaxphys.mpm.fracture import FRACTURE
-from jaxphys.mpm.law import Law
-from jaxphys.mpm.parameters import ALTERNATIVES, check_parameter
-from jaxphys.mpm.plasticity import DRUCKER_PRAGER, UNCORRECTED_DRUCKER_PRAGER, VON_MISES
+from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
+from jaxphys.mpm.materials.fracture import FRACTURE
+from jaxphys.mpm.materials.law import Law
+from jaxphys.mpm.materials.parameters import ALTERNATIVES, check_parameter
+from jaxphys.mpm.materials.plasticity import DRUCKER_PRAGER, UNCORRECTED_DRUCKER_PRAGER, VON_MISES
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
-from jaxphys.mpm.fracture import FRACTURE
-from jaxphys.mpm.materials import (
+from jaxphys.mpm.materials.catalogue import (
     MATERIALS,
     assemble_parameters,
     get_material,
     material_values,
     overridden,
 )
-from jaxphys.mpm.parameters import ALTERNATIVES, RANGES, check_parameter
-from jaxphys.mpm.plasticity import (
+from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
+from jaxphys.mpm.materials.fracture import FRACTURE
+from jaxphys.mpm.materials.parameters import ALTERNATIVES, RANGES, check_parameter
+from jaxphys.mpm.materials.plasticity import (
     DRUCKER_PRAGER,
     PERFECT_VON_MISES,
     UNCORRECTED_DRUCKER_PRAGER,

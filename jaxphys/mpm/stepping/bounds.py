@@ -11,8 +11,8 @@ from jax import Array
 from jaxphys.core import algebra
 from jaxphys.core.errors import InputError
 from jaxphys.core.spectral import left_strain
-from jaxphys.mpm.elasticity import lame
-from jaxphys.mpm.law import Law, Parameters
+from jaxphys.mpm.materials.elasticity import lame
+from jaxphys.mpm.materials.law import Law, Parameters
 
 ADVECTION = 0.5
 GRADIENT = 0.2

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.elasticity import HENCKY, lame
-from jaxphys.mpm.fracture import FRACTURE, damage_of_strain, number_of_pieces
+from jaxphys.mpm.materials.elasticity import HENCKY, lame
+from jaxphys.mpm.materials.fracture import FRACTURE, damage_of_strain, number_of_pieces
 
 VALUES = {
     "youngs_modulus": jnp.asarray(1.0),

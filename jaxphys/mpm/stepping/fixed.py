@@ -4,7 +4,7 @@ import math
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.state import Config, Model, State
-from jaxphys.mpm.time_step import StepBounds, largest_stable_dt, validate_dt
+from jaxphys.mpm.stepping.bounds import StepBounds, largest_stable_dt, validate_dt
 
 # The bounds hold for the initial state; an object that is pressed together gets stiffer, and a
 # frame that starts stiffer than its step allows fails.

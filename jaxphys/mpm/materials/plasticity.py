@@ -19,7 +19,7 @@ from jaxphys.core import algebra
 from jaxphys.core.errors import InputError, nearest
 from jaxphys.core.program import part
 from jaxphys.core.spectral import left_isotropic
-from jaxphys.mpm.elasticity import (
+from jaxphys.mpm.materials.elasticity import (
     ELASTIC_PARAMETERS,
     hencky_energy,
     hencky_principal_energy,
@@ -27,7 +27,7 @@ from jaxphys.mpm.elasticity import (
     lame,
     without_memory,
 )
-from jaxphys.mpm.law import Law, Parameters
+from jaxphys.mpm.materials.law import Law, Parameters
 
 # sqrt(3/2) |dev tau| is the stress of a uniaxial test, sqrt(2/3) |plastic strain| its plastic
 # strain.

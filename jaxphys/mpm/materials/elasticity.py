@@ -7,7 +7,7 @@ from jax import Array
 
 from jaxphys.core import algebra
 from jaxphys.core.spectral import left_isotropic, left_strain, polar_rotation, volume_change
-from jaxphys.mpm.law import Law, Parameters
+from jaxphys.mpm.materials.law import Law, Parameters
 
 ELASTIC_PARAMETERS = ("youngs_modulus", "poisson_ratio")
 MODULI = ("shear_modulus", "first_lame_parameter")

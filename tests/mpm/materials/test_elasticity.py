@@ -3,8 +3,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxphys.mpm import elasticity
-from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
+from jaxphys.mpm.materials import elasticity
+from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
 
 LAWS = [NEO_HOOKEAN, FIXED_COROTATED, HENCKY]
 E, NU = 1.3, 0.3

@@ -7,10 +7,10 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.boundaries import Damping
-from jaxphys.mpm.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN, lame
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN, lame
 from jaxphys.mpm.state import Config, Model, initial_state
-from jaxphys.mpm.time_step import (
+from jaxphys.mpm.stepping.bounds import (
     contact_bound,
     hard_limit,
     isolated_bound,

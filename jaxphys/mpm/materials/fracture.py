@@ -9,14 +9,18 @@ from jax import Array
 from jaxphys.core.errors import InputError
 from jaxphys.core.parts import connected_parts
 from jaxphys.core.spectral import left_isotropic
-from jaxphys.mpm.elasticity import (
+from jaxphys.mpm.materials.elasticity import (
     ELASTIC_PARAMETERS,
     hencky_density,
     hencky_principal_energy,
     lame,
 )
-from jaxphys.mpm.law import Law, Parameters
-from jaxphys.mpm.plasticity import apply_change, drucker_prager_values, friction_coefficient
+from jaxphys.mpm.materials.law import Law, Parameters
+from jaxphys.mpm.materials.plasticity import (
+    apply_change,
+    drucker_prager_values,
+    friction_coefficient,
+)
 
 
 def damage_of_strain(strain: Array, fracture_strain: Array, softening_strain: Array) -> Array:

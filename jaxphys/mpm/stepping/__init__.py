@@ -1,0 +1,1 @@
+"""Which times a simulation steps to."""
