@@ -14,7 +14,7 @@ from jaxphys.mpm.loop.placement import Placement
 from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.transfer.stencil import Window
 
-CODES = 8
+CODES = 10
 (
     OK,
     NOT_FINITE,
@@ -24,6 +24,8 @@ CODES = 8
     INVERTED,
     COLLAPSED,
     UNSTABLE_STEP,
+    TOO_MANY_STEPS,
+    NOT_CONVERGED,
 ) = range(CODES)
 
 
@@ -40,6 +42,8 @@ class Config:
         that spans c cells needs c + 3 nodes, two more if it moves, and room for what its motion
         adds.
     check_step: compare dt with what the state's stiffness allows, at the start of every rollout.
+    tells_rates: a pass tells how fast its particles move and deform (`Seen.rates`), for steps that
+        adapt.
     placement: in which chunks and on which devices particles are computed.
     """
 
@@ -48,6 +52,7 @@ class Config:
     track_total: bool = False
     window: tuple[int, int, int] | None = None
     check_step: bool = True
+    tells_rates: bool = False
     placement: Placement = Placement()
 
     def __post_init__(self):
@@ -112,7 +117,8 @@ class Model:
 
     mass: (N,) [kg]; volume: (N,) rest volume [m^3]; parameters: name -> (N,), as the laws name
     them; gravity: (3,) [m/s^2], or None for none, which no step then adds; boundaries: as
-    `boundaries.prepare` makes them.
+    `boundaries.prepare` makes them; wave_modulus: (N,) of waves at rest [Pa], which a rollout works
+    out for its boundaries (`stepping.bounds.with_wave_modulus`).
     """
 
     mass: Array
@@ -120,15 +126,17 @@ class Model:
     parameters: dict[str, Array]
     gravity: Array | None
     boundaries: tuple = ()
+    wave_modulus: Array | None = None
 
 
 class Status(NamedTuple):
     """Whether a simulation is sound, and if not, what failed first. All scalars, int32.
 
     code: OK, or one of NOT_FINITE, LEFT_GRID, STEP_TOO_LARGE, LEFT_WINDOW, INVERTED, COLLAPSED,
-    UNSTABLE_STEP, which `loop.status.check` explains; step: steps taken before the one that failed;
-    particle: the lowest index that failed in it (UNSTABLE_STEP: the one that allows least); taken:
-    steps taken in all. `step` and `particle` are -1 while code is OK.
+    UNSTABLE_STEP, TOO_MANY_STEPS, NOT_CONVERGED, which `loop.status.check` explains; step: steps
+    taken before the one that failed; particle: the lowest index that failed in it (UNSTABLE_STEP,
+    TOO_MANY_STEPS: the one that allows least; NOT_CONVERGED: -1, for it is the step that failed);
+    taken: steps taken in all. `step` and `particle` are -1 while code is OK.
     """
 
     code: Array
@@ -151,6 +159,24 @@ class Residual(NamedTuple):
     time: Array | None
 
 
+class RigidBody(NamedTuple):
+    """A rigid body that particles push.
+
+    position: of its centre of mass [m], (3,); orientation: quaternion from its own axes to the
+    world's, (4,); momentum: [kg m/s], (3,); angular_momentum: about its centre of mass
+    [kg m^2/s], (3,); rest: what rounding left out of position and orientation, or None in float64;
+    slip: how far its points are strained along surfaces with friction [m], three rows a surface,
+    (R, P), or None if there are none.
+    """
+
+    position: Array
+    orientation: Array
+    momentum: Array
+    angular_momentum: Array
+    rest: tuple[Array, Array] | None
+    slip: Array | None
+
+
 class State(NamedTuple):
     """What a step changes. Particle axis last.
 
@@ -159,7 +185,7 @@ class State(NamedTuple):
     None where it is the same or not asked for; history: (H, N) or None if no law keeps any;
     time: () [s]; status: `Status`; residual: `Residual`, or None in float64, where sums have digits
     to spare; slip: (R, N) [m], how far contact is strained along surfaces with friction, three rows
-    each, or None if there are none.
+    each, or None if there are none; rigid: the `RigidBody`, or None if no boundary is free.
     """
 
     position: Array
@@ -172,6 +198,7 @@ class State(NamedTuple):
     status: Status
     residual: Residual | None = None
     slip: Array | None = None
+    rigid: RigidBody | None = None
 
 
 def initial_state(
@@ -211,7 +238,7 @@ def initial_state(
         return jnp.zeros((*shape, count), dtype)
 
     if deformation is not None:
-        _refuse_inverted(deformation)
+        refuse_inverted(deformation, "initial_state")
     else:
         deformation = jnp.broadcast_to(jnp.eye(3, dtype=dtype), (count, 3, 3))
     history = None
@@ -249,17 +276,20 @@ def initial_state(
         ),
         residual=residual,
         slip=zeros(rows) if rows else None,
+        rigid=next((b.body(boundaries) for b in boundaries if b.free), None),
     )
 
 
-def _refuse_inverted(deformation) -> None:
-    """Raises `InputError` if some det F of concrete gradients (N, 3, 3) is not positive."""
+def refuse_inverted(deformation, where: str) -> None:
+    """Raises `InputError` if some det F of concrete gradients (N, 3, 3) is not positive; where: for
+    its message.
+    """
     if isinstance(deformation, jax.core.Tracer) or np.shape(deformation)[1:] != (3, 3):
         return
     volume = np.linalg.det(np.asarray(deformation, np.float64))
     wrong = np.flatnonzero(volume <= 0)
     if wrong.size:
         raise InputError(
-            f"initial_state: deformation[{wrong[0]}] has determinant {volume[wrong[0]]:.3g}: no "
+            f"{where}: deformation[{wrong[0]}] has determinant {volume[wrong[0]]:.3g}: no "
             "motion leads there; give gradients with det F > 0."
         )

@@ -17,6 +17,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core import algebra
+from jaxphys.core.errors import InputError
 from jaxphys.mpm.boundaries import Boundary, Plane, Setting
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.rollout import step
@@ -236,6 +237,8 @@ def energy(problem: Discretisation, state: State) -> float:
     ((law, _, _),) = problem.config.segments
     speed = jnp.sum(state.velocity**2, axis=0) + 0.25 * jnp.sum(state.affine**2, axis=(0, 1))
     history = jnp.zeros((0, state.position.shape[1])) if state.history is None else state.history
+    if law.energy is None:
+        raise InputError(f"energy: the law {law.name} stores none")
     stored = law.energy(problem.model.parameters, state.deformation, history)
     return float(jnp.sum(0.5 * problem.model.mass * speed + problem.model.volume * stored))
 

@@ -24,10 +24,13 @@ from jaxphys.mpm.materials.catalogue import (
 )
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, State, initial_state
+from jaxphys.mpm.stepping import Fixed
 from jaxphys.mpm.stepping.fixed import choose_substep
 from jaxphys.scene.look import Look, look_of
+from jaxphys.scene.obstacles import sampled
 from jaxphys.scene.place import Placed, place
 from jaxphys.scene.scene import Object, Scene
+from jaxphys.scene.solids import solids_of
 
 
 class Built(NamedTuple):
@@ -165,7 +168,7 @@ def solver_parts(
 
     positions, volumes = gathered("positions"), gathered("volumes")
     setting = Setting(grid, positions, volumes, dtype)
-    boundaries = prepare(scene.boundaries, setting)
+    boundaries = prepare(sampled(scene), setting)
     if scene.damping > 0:
         boundaries = (*boundaries, Damping(scene.damping).prepared(setting))
     state = initial_state(
@@ -231,5 +234,9 @@ def build(
         dt=dt,
         steps=steps,
         given_substep=scene.substep,
+        stepping=scene.stepping or Fixed(),
     )
-    return Built(simulation, look_of(placed, scene.regularise_colours))
+    solids: tuple = ()
+    if scene.obstacle_colour is not None:
+        solids = solids_of(model.boundaries, scene.obstacle_colour, scene.seed)
+    return Built(simulation, look_of(placed, scene.regularise_colours, solids))

@@ -8,6 +8,10 @@ from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, initial_state
 
+# The materials that whole motions are tested with; others differ in what they do to one particle,
+# which the tests of laws look at.
+KINDS = ("elastic", "jelly", "metal", "sand", "fracture")
+
 
 def block(count=60, shape=(9, 10, 11), dtype=jnp.float64, seed=0, law=NEO_HOOKEAN, **options):
     """A random block in motion: (config, model, state). Spacing 0.1 m; strained, spinning."""

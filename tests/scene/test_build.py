@@ -1,3 +1,6 @@
+from dataclasses import replace
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -5,7 +8,9 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import covariances, from_points
+from jaxphys.mpm.boundaries import Plane
 from jaxphys.mpm.loop.frames import rollout_frames
+from jaxphys.mpm.stepping import Adaptive, Fixed
 from jaxphys.pipeline.draw import draw
 from jaxphys.render.camera import orbit
 from jaxphys.scene import Domain, Object, Region, Rotation, Scene
@@ -77,6 +82,43 @@ def test_only_what_is_inside_the_area_moves():
 def test_substep_divides_the_frame():
     simulation, _ = build(scene(), GAUSSIANS)
     assert simulation.steps * simulation.dt == pytest.approx(0.01)
+
+
+def test_float64_goes_all_the_way():
+    """From the scene to the last frame where JAX is set to it, and nowhere through float32."""
+    thing = {"velocity": (0.1, 0.2, -0.7), "spin": (0.0, 0.0, 0.3), "parameters": {"density": 0.1}}
+    asked = replace(scene(**thing), boundaries=(Plane((0.5, 0.5, 0.1), friction=0.3),), damping=0.1)
+    for dtype, wanted in ((None, jnp.float64), ("float32", jnp.float32)):
+        simulation, _ = build(asked, GAUSSIANS, dtype=dtype)
+        numbers = (simulation.model, simulation.state)
+        kinds = {leaf.dtype for leaf in jax.tree.leaves(numbers) if leaf.dtype.kind == "f"}
+        assert kinds == {jnp.dtype(wanted)}
+        motion = jax.eval_shape(partial(rollout_frames, frames=2), simulation)
+        assert motion.position.dtype == motion.time.dtype == wanted
+        adapting = replace(simulation, stepping=Adaptive())
+        motion = jax.eval_shape(partial(rollout_frames, frames=2), adapting)
+        assert motion.position.dtype == motion.time.dtype == wanted
+    simulation = build(asked, GAUSSIANS).simulation.with_(poisson_ratio=0.2)
+    model, x, v = simulation.model, simulation.state.position, simulation.state.velocity
+    # What float32 would round at the seventh digit.
+    np.testing.assert_allclose(model.mass / model.volume, 0.1, rtol=1e-14)
+    np.testing.assert_allclose(v[0], 0.1 - 0.3 * (x[1] - 0.5), rtol=1e-13)
+    np.testing.assert_allclose(model.parameters["poisson_ratio"], 0.2, rtol=1e-15)
+    assert float(model.boundaries[0].friction) == 0.3 and float(model.boundaries[1].rate) == 0.1
+
+
+def test_a_scene_says_how_it_is_stepped():
+    """Films adapt where nothing else is said; a given substep is a fixed one."""
+    assert build(scene(), GAUSSIANS).simulation.stepping == Fixed()
+    assert scene().filmed().stepping == Adaptive()
+    assert build(scene().filmed(), GAUSSIANS).simulation.stepping == Adaptive()
+    assert replace(scene(), substep=1e-4).filmed().stepping == Fixed()
+    fixed = replace(scene(), stepping=Fixed())
+    assert fixed.filmed() == fixed
+    with pytest.raises(InputError, match=r"substep: .* fixed"):
+        replace(scene(), stepping=Adaptive(), substep=1e-4)
+    with pytest.raises(InputError, match="every: 0 must be at least 1"):
+        Adaptive(every=0)
 
 
 def test_unknown_parameter_of_with():

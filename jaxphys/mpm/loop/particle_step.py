@@ -13,6 +13,7 @@ from jax import Array
 from jaxphys.core import algebra, compensated
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
+from jaxphys.mpm.boundaries.free import Wrench
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.state import Residual
@@ -21,13 +22,15 @@ from jaxphys.mpm.state import Residual
 class Shared(NamedTuple):
     """What is the same for all particles.
 
-    gravity: (3,) [m/s^2] or None; boundaries: without what they hold of every particle; dt: [s];
-    time: [s], at the start of the step that moves; later: at its end, where the next one starts.
+    gravity: (3,) [m/s^2] or None; boundaries: without what they hold of every particle; dt: [s], of
+    the step that moves; ahead: [s], of the next one, for which a pass gives; time: [s], at the
+    start of the step that moves; later: at its end, where the next one starts.
     """
 
     gravity: Array | None
     boundaries: tuple
     dt: Array
+    ahead: Array
     time: Array
     later: Array
 
@@ -108,26 +111,28 @@ def move(
 
 def give(
     grid: Grid, law: Law, shared: Shared, matter: Matter, particles: Particles, flow: Flow
-) -> tuple[Particles, Array, Array]:
+) -> tuple[Particles, Array, Array, Wrench | None]:
     """Particles past their law (return map and stress of the trial gradient together) and past
-    contact, and what they give to the grid: momentum (3, N) [kg m/s] and affine part (3, 3, N).
+    contact, and what they give to the grid: momentum (3, N) [kg m/s] and affine part (3, 3, N); and
+    what of it a rigid body gave.
     """
     history = particles.history
     kept = jnp.zeros((0, *matter.mass.shape), matter.mass.dtype) if history is None else history
     with part(f"law {law.name}"):
-        F, stress, kept = law.update(matter.parameters, particles.deformation, kept)
+        F, stress, kept = law.update(matter.parameters, particles.deformation, kept, shared.dt)
     # Momentum changes by m C per metre, less the impulse of the stress: -dt V tau grad w, in which
     # MLS-MPM replaces grad w by w (x_i - x_p) 4 / dx^2.
-    impulse = (-4.0 / grid.spacing**2) * shared.dt * matter.volume
+    impulse = (-4.0 / grid.spacing**2) * shared.ahead * matter.volume
     affine = matter.mass * velocity_gradient(grid, flow) + impulse * stress
     momentum = matter.mass * flow.velocity
-    given, slip = stages.impulses(
+    given, slip, wrench = stages.impulses(
         shared.boundaries,
         matter.loads,
         particles.position,
         flow.velocity,
         particles.slip,
         shared.later,
+        shared.ahead,
         shared.dt,
     )
     if given is not None:
@@ -135,7 +140,7 @@ def give(
     after = particles._replace(deformation=F, slip=slip)
     if history is not None:
         after = after._replace(history=kept)
-    return after, momentum, affine
+    return after, momentum, affine, wrench
 
 
 def update_grid(shared: Shared, lightest: Array, rows: Array) -> Array:

@@ -11,9 +11,11 @@ from jaxphys.mpm.state import (
     INVERTED,
     LEFT_GRID,
     LEFT_WINDOW,
+    NOT_CONVERGED,
     NOT_FINITE,
     OK,
     STEP_TOO_LARGE,
+    TOO_MANY_STEPS,
     UNSTABLE_STEP,
     Config,
     Status,
@@ -61,6 +63,14 @@ _CAUSES = {
         "is stiffer than the step allows",
         "take a smaller dt (mpm.largest_stable_dt gives one), or a softer or denser material",
     ),
+    TOO_MANY_STEPS: (
+        "keeps the steps so short that a frame takes more than the most allowed",
+        "raise Adaptive.most_steps, or take a softer or denser material or a coarser grid",
+    ),
+    NOT_CONVERGED: (
+        "the equations of an implicit step were not solved, however short it was",
+        "raise the tolerance, the iterations or most_steps of Implicit, or take explicit steps",
+    ),
 }
 
 
@@ -75,8 +85,9 @@ def check(status: Status, frame: int | None = None) -> None:
     what, remedy = _CAUSES[code]
     where = "" if frame is None else f"frame {frame}, "
     number, particle = int(status.step), int(status.particle)
+    who = f"particle {particle} " if particle >= 0 else ""
     raise SimulationError(
-        f"Simulation failed at {where}step {number}: particle {particle} {what}; {remedy}.",
+        f"Simulation failed at {where}step {number}: {who}{what}; {remedy}.",
         frame,
         number,
         particle,

@@ -1,4 +1,4 @@
-"""The two sums over the 27 nodes i of each particle p, and their transposes.
+"""The two sums over the 27 nodes i of each particle p, their tangents and their transposes.
 
 With weight w and distance d = x_i - x_p:
 
@@ -20,6 +20,8 @@ from jax import Array
 
 from jaxphys.mpm.transfer.stencil import Stencil, Window
 
+HALVES = slice(0, 4), slice(4, 8)
+
 
 def scatter(
     window: Window, at: Stencil, rows: Array, mass: Array | None, momentum: Array, affine: Array
@@ -35,24 +37,29 @@ def scatter(
         affine: (3, 3, N) [kg/s], what momentum changes by per metre: m C - dt V 4/dx^2 tau for
             MLS-MPM (Hu et al. 2018, eq. 29).
     """
-    plane, line = window.shape[1] * window.shape[2], window.shape[2]
-    (wx, wy, wz), (mx, my, mz) = at.weight[..., None], at.moment[..., None]
-    value = _rows(momentum, mass)
-    along = [_rows(affine[:, axis]) for axis in range(3)]
+    gifts = _gifts(at.weight, at.moment, _rows(momentum, mass), [*_columns(affine)])
+    return _add_planes(window, at, rows, gifts)
 
-    def add_plane(a, rows):
-        first = at.row + a * plane
-        for b in range(3):
-            w = wx[a] * wy[b]
-            constant = w * value + mx[a] * wy[b] * along[0] + wx[a] * my[b] * along[1]
-            for c in range(3):
-                new = wz[c] * constant + mz[c] * w * along[2]
-                rows = rows.at[first + (b * line + c)].add(
-                    new, mode="promise_in_bounds", wrap_negative_indices=False
-                )
-        return rows
 
-    return jax.lax.fori_loop(0, 3, add_plane, rows)
+def scatter_tangent(
+    window: Window, at: Stencil, rows: Array, given: tuple, moved: Array, of_given: tuple
+) -> Array:
+    """`rows` and the tangent (M, 4) of what particles give to them in `scatter`.
+
+    given: mass, momentum and affine; moved: tangent (3, N) of the position; of_given: of the three.
+    """
+    inputs, tangents = (
+        (weight, moment, _rows(momentum, mass), [*_columns(affine)])
+        for (weight, moment), (mass, momentum, affine) in (
+            ((at.weight, at.moment), given),
+            (_moved(at, moved), of_given),
+        )
+    )
+
+    def gifts(a):
+        return jax.jvp(lambda *numbers: [*_gifts(*numbers)(a)], inputs, tangents)[1]
+
+    return _add_planes(window, at, rows, gifts)
 
 
 def gather(window: Window, at: Stencil, rows: Array) -> tuple[Array, Array]:
@@ -62,6 +69,26 @@ def gather(window: Window, at: Stencil, rows: Array) -> tuple[Array, Array]:
     (Jiang et al. 2015).
     """
     sums, *moments = _over_planes(window, at, rows, *_sum_terms(at))
+    return _particle_last(sums, moments)
+
+
+def gather_tangent(
+    window: Window, at: Stencil, rows: Array, moved: Array, of_rows: Array
+) -> tuple[Array, Array]:
+    """Tangent of `gather`, from those of the position (3, N) and of the rows (M, 4)."""
+    weights, rates = (at.weight, at.moment), _moved(at, moved)
+
+    def terms(a, nodes):
+        # Both rows of a node lie side by side, so that they are read as one.
+        inner, outer = ([[node[:, half] for node in line] for line in nodes] for half in HALVES)
+
+        def of(weights, nodes):
+            return _sum_terms(at._replace(weight=weights[0], moment=weights[1]))[0](a, nodes)
+
+        return jax.jvp(of, (weights, inner), (rates, outer))[1]
+
+    both = jnp.concatenate([rows, of_rows], axis=1)
+    sums, *moments = _over_planes(window, at, both, terms, _sum_terms(at)[1])
     return _particle_last(sums, moments)
 
 
@@ -95,6 +122,45 @@ def gather_slopes(
     """
     slopes = _over_planes(window, at, rows, *_slope_terms(at, None, velocity, moment))
     return _through_position(slopes, moment, sums)
+
+
+def _moved(at, moved):
+    """Tangents of a stencil's weights and moments, from that of the position (3, N)."""
+    rate = at.slope * moved[:, None]
+    return rate, rate * at.distance - at.weight * moved[:, None]
+
+
+def _columns(affine):
+    return (_rows(affine[:, axis]) for axis in range(3))
+
+
+def _gifts(weight, moment, value, along):
+    """What particles give to the nine nodes of a plane, (N, 4) each, z fastest."""
+    (wx, wy, wz), (mx, my, mz) = weight[..., None], moment[..., None]
+
+    def gifts(a):
+        for b in range(3):
+            w = wx[a] * wy[b]
+            constant = w * value + mx[a] * wy[b] * along[0] + wx[a] * my[b] * along[1]
+            for c in range(3):
+                yield wz[c] * constant + mz[c] * w * along[2]
+
+    return gifts
+
+
+def _add_planes(window, at, rows, gifts):
+    """`rows` and, plane by plane of the stencil, what `gifts(a)` gives to its nodes."""
+    plane, line = window.shape[1] * window.shape[2], window.shape[2]
+
+    def add_plane(a, rows):
+        first = at.row + a * plane
+        for i, new in enumerate(gifts(a)):
+            rows = rows.at[first + (i // 3 * line + i % 3)].add(
+                new, mode="promise_in_bounds", wrap_negative_indices=False
+            )
+        return rows
+
+    return jax.lax.fori_loop(0, 3, add_plane, rows)
 
 
 def _rows(vectors: Array, last: Array | None = None) -> Array:
