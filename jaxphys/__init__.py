@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .core.ensemble import over_devices as over_devices
     from .core.errors import InputError as InputError
+    from .fitting.fit import fit as fit
     from .gaussians.gaussians import Gaussians as Gaussians
     from .mpm.loop.adjoint import Checkpointed as Checkpointed
     from .mpm.loop.adjoint import Plain as Plain
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "over_devices": "core.ensemble",
     "InputError": "core.errors",
+    "fit": "fitting.fit",
     "Gaussians": "gaussians.gaussians",
     "Checkpointed": "mpm.loop.adjoint",
     "Plain": "mpm.loop.adjoint",

@@ -35,3 +35,8 @@ from .stepping import Fixed as Fixed
 from .stepping.bounds import StepBounds as StepBounds
 from .stepping.bounds import largest_stable_dt as largest_stable_dt
 from .stepping.bounds import validate_dt as validate_dt
+from .transfer.schemes import AFLIP as AFLIP
+from .transfer.schemes import APIC as APIC
+from .transfer.schemes import FLIP as FLIP
+from .transfer.schemes import PIC as PIC
+from .transfer.schemes import Transfer as Transfer

@@ -17,7 +17,6 @@ from jaxphys.core.fields import PLACE, RATE, SPEED, between, check_number
 from jaxphys.mpm.boundaries import Setting
 from jaxphys.mpm.materials.parameters import Parameter, check_parameter
 from jaxphys.mpm.state import Config, Model, State, refuse_inverted
-from jaxphys.mpm.transfer import inside
 
 GRAVITY = between(-1e6, 1e6)
 STRETCH = between(-1e6, 1e6)
@@ -159,7 +158,7 @@ def with_start(
 
 
 def _refuse_outside(config: Config, position: Array) -> None:
-    within = np.asarray(inside(position.T, config.grid.spacing, config.grid.shape))
+    within = np.asarray(config.kernel.inside(position.T, config.grid.spacing, config.grid.shape))
     if not within.all():
         which = int(np.flatnonzero(~within)[0])
         where = ", ".join(f"{x:.4g}" for x in np.asarray(position[which]))

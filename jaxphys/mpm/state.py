@@ -12,6 +12,8 @@ from jaxphys.core.errors import InputError
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.placement import Placement
 from jaxphys.mpm.materials.law import Law
+from jaxphys.mpm.transfer.kernels import Kernel
+from jaxphys.mpm.transfer.schemes import Transfer
 from jaxphys.mpm.transfer.stencil import Window
 
 CODES = 10
@@ -39,12 +41,13 @@ class Config:
         where a law is plastic; elsewhere the two are the same.
     window: nodes per axis of the part of the grid that is computed, or None for all of it. The
         window follows the particles; if they outgrow it, the status says so. A block of particles
-        that spans c cells needs c + 3 nodes, two more if it moves, and room for what its motion
-        adds.
+        that spans c cells needs c + 3 nodes, c + 4 with cubic splines, two more if it moves, and
+        room for what its motion adds.
     check_step: compare dt with what the state's stiffness allows, at the start of every rollout.
     tells_rates: a pass tells how fast its particles move and deform (`Seen.rates`), for steps that
         adapt.
     placement: in which chunks and on which devices particles are computed.
+    transfer: how particles and grid exchange velocities, and with which kernel.
     """
 
     grid: Grid
@@ -54,6 +57,7 @@ class Config:
     check_step: bool = True
     tells_rates: bool = False
     placement: Placement = Placement()
+    transfer: Transfer = Transfer()
 
     def __post_init__(self):
         reached = 0
@@ -66,11 +70,17 @@ class Config:
             reached = stop
         if not reached:
             raise InputError("Config.segments is empty: give at least one (law, start, stop).")
+        width = self.kernel.width
+        if min(self.grid.shape) < width:
+            raise InputError(
+                f"Config.grid has shape {self.grid.shape}: {self.transfer.kernel} splines touch "
+                f"{width} nodes per axis; give at least as many."
+            )
         if self.window is not None and not all(
-            3 <= w <= n for w, n in zip(self.window, self.grid.shape, strict=True)
+            width <= w <= n for w, n in zip(self.window, self.grid.shape, strict=True)
         ):
             raise InputError(
-                f"Config.window is {self.window}: it must lie between 3 nodes and the grid's "
+                f"Config.window is {self.window}: it must lie between {width} nodes and the grid's "
                 f"{self.grid.shape} on each axis."
             )
 
@@ -78,6 +88,11 @@ class Config:
     def particles(self) -> int:
         """Number of particles."""
         return self.segments[-1][2]
+
+    @property
+    def kernel(self) -> Kernel:
+        """That of the transfers."""
+        return self.transfer.spline
 
     @property
     def nodes(self) -> tuple[int, int, int]:
@@ -97,7 +112,7 @@ class Config:
     @property
     def computed(self) -> Window:
         """The part of the grid that is computed, for transfers."""
-        return Window(self.nodes, self.grid.spacing, self.grid.shape)
+        return Window(self.nodes, self.grid.spacing, self.grid.shape, self.kernel)
 
     @property
     def history_rows(self) -> int:

@@ -59,6 +59,10 @@ OPTIONAL: Mapping[str, tuple[str, str]] = MappingProxyType(
             "float32 would round small steps away",
             "float64 has digits to spare",
         ),
+        "velocity of its own": (
+            "the transfer lets particles keep one",
+            "particles move as the grid does",
+        ),
         "contact": (
             "a boundary pushes particles at their distance",
             "no boundary touches particles",
@@ -212,7 +216,8 @@ def describe(scene: Scene, built: Built) -> Plan:
     included, left_out = _facts(scene, built)
     bounds = largest_stable_dt(simulation.config, simulation.model, simulation.state)
     reason = bounds.reason if scene.substep is None else "the scene's own substep"
-    placement = simulation.config.placement
+    placement, transfer = simulation.config.placement, simulation.config.transfer
+    row, stencil = 4 * transfer.columns, transfer.spline.width**3
     chunk = max(into.size for into in cuts(simulation.config.runs, placement))
     particles, drawn = simulation.config.particles, look.gaussians.count
     nodes = int(np.prod(simulation.config.grid.shape))
@@ -241,8 +246,8 @@ def describe(scene: Scene, built: Built) -> Plan:
         steps=steps,
         memory={
             "state and parameters": state + model,
-            "grid": 16 * nodes,
-            "transfers": 27 * 16 * placement.devices * chunk,
+            "grid": row * nodes,
+            "transfers": stencil * row * placement.devices * chunk,
             "motion": 48 * drawn * scene.frames,
             "pictures": 32 * pixels * drawn_at_once(scene.frames),
         },

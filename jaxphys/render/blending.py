@@ -4,7 +4,7 @@ A pixel sums w_i f_i over the splats of its tile in depth order, w_i = a_i prod_
 with a_i = min(alpha_max, o_i exp(-(u^2 + v^2) / 2)) (Kerbl et al. 2023, eq. 3); colour, depth and
 opacity are all features f. Groups of tiles of about equal list length advance in lockstep, a chunk
 of splats at a time, until every pixel of the group is finished. Tangents go through the same loop;
-its transpose, the gradient, is written by hand, in `blending_gradient.py`.
+its transpose, the gradient, is written by hand, in `blending_gradient.py` (`core.linear_map`).
 """
 
 from functools import partial
@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from jax import Array, lax
 
 from jaxphys.core import algebra
+from jaxphys.core.linear_map import linear_map
 from jaxphys.render.binning import Boxes, Grid, TileLists
 from jaxphys.render.blending_gradient import blend_backward
 from jaxphys.render.settings import Settings
@@ -30,7 +31,7 @@ from jaxphys.render.tile_groups import (
 )
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(4, 5))
+@partial(jax.custom_jvp, nondiff_argnums=(4, 5))
 def blend(
     geometry: Array, features: Array, boxes: Boxes, lists: TileLists, grid: Grid, settings: Settings
 ) -> Array:
@@ -54,6 +55,25 @@ def _forward(geometry, features, boxes, lists, grid, settings):
     return total, (table, work, boxes, lists, total)
 
 
+@blend.defjvp
+def _blend_jvp(grid, settings, primals, tangents):
+    geometry, features, boxes, lists = primals
+    total, residuals = _forward(geometry, features, boxes, lists, grid, settings)
+
+    def forward(kept, rates):
+        filled = [
+            jnp.zeros_like(own) if rate is None else rate
+            for own, rate in zip((geometry, features), rates, strict=True)
+        ]
+        return (blend_tangent(grid, settings, kept, filled),)
+
+    def transpose(kept, cotangents):
+        return blend_backward(grid, settings, kept, cotangents[0])[:2]
+
+    (rate,) = linear_map(forward, transpose, residuals, tangents[:2], (total,))
+    return total, rate
+
+
 def blend_tangent(grid, settings, residuals, tangents):
     """The derivative of `blend` along tangents, whose transpose is `blend_backward`.
 
@@ -70,7 +90,7 @@ def blend_tangent(grid, settings, residuals, tangents):
     def totals(table: Array) -> Array:
         return _totals(table, boxes, lists, work, grid, settings)
 
-    return jax.jvp(totals, (table,), (by_rank(*tangents, boxes),))[1]
+    return jax.jvp(totals, (table,), (by_rank(tangents[0], tangents[1], boxes),))[1]
 
 
 def by_rank(geometry: Array, features: Array, boxes: Boxes) -> Array:
@@ -117,6 +137,3 @@ def _features_sum(weights: Array, features: Array) -> Array:
     return algebra.total(
         weights[:, k, None, :] * features[:, k, :, None] for k in range(weights.shape[1])
     )
-
-
-blend.defvjp(_forward, blend_backward)

@@ -26,6 +26,7 @@ from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, State, initial_state
 from jaxphys.mpm.stepping import Fixed
 from jaxphys.mpm.stepping.fixed import choose_substep
+from jaxphys.mpm.transfer.kernels import Kernel
 from jaxphys.scene.look import Look, look_of
 from jaxphys.scene.obstacles import sampled
 from jaxphys.scene.place import Placed, place
@@ -110,7 +111,7 @@ def place_objects(scene: Scene, objects: tuple[Gaussians, ...]) -> tuple[Placed,
         )
     grid = solver_grid(scene)
     return tuple(
-        place(gaussians, thing, grid, f"objects[{i}]", scene.seed + i)
+        place(gaussians, thing, grid, scene.transfer.spline, f"objects[{i}]", scene.seed + i)
         for i, (gaussians, thing) in enumerate(zip(objects, scene.objects, strict=True))
     )
 
@@ -138,10 +139,10 @@ def particles_of(placed: Placed, thing: Object) -> Particles:
     )
 
 
-def arrangement_of(parts: list[Particles], grid: Grid) -> np.ndarray:
+def arrangement_of(parts: list[Particles], grid: Grid, kernel: Kernel) -> np.ndarray:
     """Which particle, in the objects' order, the solver keeps at each of its places (N,)."""
     starts = np.cumsum([0, *(len(part.positions) for part in parts)])
-    orders = [cell_order(part.positions, grid) for part in parts]
+    orders = [cell_order(part.positions, grid, kernel=kernel) for part in parts]
     return np.concatenate([start + order for start, order in zip(starts, orders, strict=False)])
 
 
@@ -161,6 +162,7 @@ def solver_parts(
         track_total=scene.splats_follow == "total",
         check_step=not scene.unsafe_substep,
         placement=suited(len(arrangement)),
+        transfer=scene.transfer,
     )
 
     def gathered(name: str) -> np.ndarray:
@@ -213,7 +215,7 @@ def build(
     placed = place_objects(scene, objects) if placed is None else placed
     grid = solver_grid(scene)
     parts = [particles_of(one, thing) for one, thing in zip(placed, scene.objects, strict=True)]
-    arrangement = arrangement_of(parts, grid)
+    arrangement = arrangement_of(parts, grid, scene.transfer.spline)
     config, model, state = solver_parts(scene, parts, arrangement, dtype)
     dt, steps, _ = choose_substep(
         config,

@@ -21,6 +21,7 @@ from jaxphys.core.fields import (
 )
 from jaxphys.mpm.boundaries import AnyBoundary, Vector
 from jaxphys.mpm.stepping import Adaptive, Fixed, Stepping
+from jaxphys.mpm.transfer.schemes import Transfer
 from jaxphys.scene.view import ANGLE, View
 
 Area = tuple[float, float, float, float, float, float]
@@ -218,6 +219,7 @@ class Scene(Checked):
         gravity: [m/s^2].
         boundaries: in the order in which they act.
         domain: the simulated box and its grid.
+        transfer: how particles and grid exchange velocities.
         damping: the grid's velocity decays at this rate [1/s].
         frames: pictures of the video, the first one at rest.
         fps: pictures a second of the video.
@@ -245,6 +247,7 @@ class Scene(Checked):
     gravity: Vector = field(default=(0.0, 0.0, -9.81), metadata=between(-1e6, 1e6))
     boundaries: tuple[AnyBoundary, ...] = ()
     domain: Domain = Domain()
+    transfer: Transfer = Transfer()
     damping: float = field(default=0.0, metadata=between(0, 1e12))
     frames: int = field(default=48, metadata=between(1, 100_000))
     fps: float = field(default=24.0, metadata=between(0.1, 1000.0))

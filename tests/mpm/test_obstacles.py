@@ -392,7 +392,7 @@ def test_derivatives_of_a_push_by_place_turn_speed_spin_friction_and_size(index)
 
     def end(boundaries):
         push, kept = boundaries[0].impulse(
-            x, 0 * x, slip, loads, jnp.asarray(0.01), jnp.asarray(0.05)
+            x, 0 * x, slip, loads, jnp.asarray(0.01), jnp.asarray(0.05), jnp.asarray(0.05)
         )
         return jnp.sum(weights * (push + 30 * kept))
 

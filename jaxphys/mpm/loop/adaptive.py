@@ -128,7 +128,9 @@ def _weakest(config: Config, safety: float, own) -> tuple[Array, Array, Array]:
         matter = whole(matter, flags)
         parameters = law.present(matter.parameters, history)
         density = matter.mass / jnp.where(matter.mass > 0, matter.volume, 1)
-        parts = matter_bounds(law, parameters, F, density, config.grid.spacing, safety)
+        parts = matter_bounds(
+            law, parameters, F, density, config.grid.spacing, safety, config.transfer
+        )
         # NaN counts as the least of all.
         wanted, limit = (jnp.where(jnp.isnan(part), -1, part) for part in parts)
         lowest = least(wanted)

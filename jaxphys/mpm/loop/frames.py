@@ -9,7 +9,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.mpm.loop.adaptive import rollout_adaptively
 from jaxphys.mpm.loop.adjoint import Adjoint, Checkpointed, Plain, for_frames, frame_groups
 from jaxphys.mpm.loop.budget import cost_of
-from jaxphys.mpm.loop.rollout import rollout
+from jaxphys.mpm.loop.rollout import keep_good, rollout
 from jaxphys.mpm.motion import Motion
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import OK, Config, Model, State
@@ -111,13 +111,13 @@ def _twice(
         duration=duration,
         record=places,
     )
-    # The steps of a frame that failed are not done again; taking none keeps the state, and says so
-    # in the gradient.
-    good = first.status.code == OK
-    count = jnp.where(good, steps.count, 0)
+    # Where these failed the gradient must be none, whatever the replay says of them: it goes back
+    # through it, as not a number.
+    count = jnp.maximum(steps.count, 1)
     end = rollout(config, model, state, dt=steps.dt, steps=count, adjoint=adjoint)
+    good = first.status.code == OK
     status = jax.tree.map(partial(jnp.where, good), end.status, first.status)
-    return end._replace(status=status)
+    return keep_good(state, end._replace(status=status), count)
 
 
 @partial(jax.jit, static_argnames="config")

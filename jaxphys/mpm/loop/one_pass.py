@@ -35,7 +35,6 @@ from jaxphys.mpm.loop.rates import slowest
 from jaxphys.mpm.loop.status import NO_FAILURE, failure, first_failure, least
 from jaxphys.mpm.state import Config, Residual
 from jaxphys.mpm.transfer import (
-    base_node,
     gather,
     scatter,
     stencil,
@@ -46,7 +45,7 @@ class Inputs(NamedTuple):
     """What a pass may be differentiated by. Of particles one for each segment, in chunks.
 
     matter: its numbers; start: flow of the state, for the first pass, None in the last one; rows:
-    (M, 4), momentum and mass of the nodes.
+    (M, 4), momentum and mass of the nodes, or (M, 8) where they also tell it before any force.
     """
 
     shared: Shared
@@ -102,7 +101,7 @@ def extent(config: Config, position: Array) -> Array | None:
     """`Seen.below` of particles (3, N)."""
     if config.window is None:
         return None
-    base = base_node(position, config.grid.spacing, config.grid.shape)
+    base = config.kernel.base_node(position, config.grid.spacing, config.grid.shape)
     return least(jnp.concatenate([base, -base]))
 
 
@@ -123,7 +122,7 @@ def whole(numbers: Any, flags: Any) -> Any:
 
 
 def at_nodes(config: Config, shared: Shared, rows: Array, fixed: Fixed) -> Array:
-    """Velocities of the nodes, as particles see them, (M, 4)."""
+    """Velocities of the nodes, as particles see them, (M, 4) or (M, 8)."""
     rows = update_grid(shared, fixed.lightest, rows)
     return stages.on_grid(
         shared.boundaries,
@@ -170,19 +169,18 @@ def _join_over_devices(results):
 def _forward_chunks(config: Config, last: bool, common, own):
     """All chunks of this device."""
     shared, nodes, origin, target, first = common
-    window, grid = config.computed, config.grid
+    window = config.computed
     rows = None if last else jnp.zeros_like(nodes)
     wrench = None if last else stages.no_wrench(shared.boundaries, nodes.dtype)
     seen, results = nothing_seen(config), []
 
     def taken(particles):
-        sums, moment = gather(window, stencil(window, origin, particles.position), nodes)
-        return Flow(sums[:3], moment)
+        return Flow.of(*gather(window, stencil(window, origin, particles.position), nodes))
 
     def moved(matter, numbers, particles, residual, flow):
         before = particles.position
-        particles, residual, flow = move(grid, shared, matter, particles, residual, flow, first)
-        C = velocity_gradient(grid, flow)
+        particles, residual, flow = move(config, shared, matter, particles, residual, flow, first)
+        C = velocity_gradient(config, flow)
         code = failure(
             config,
             origin,
@@ -220,7 +218,7 @@ def _forward_chunks(config: Config, last: bool, common, own):
 
         particles, residual, flow = jax.lax.cond(first, started, went_on)
         particles, residual, used, seen_too = moved(matter, numbers, particles, residual, flow)
-        particles, momentum, affine, own = give(grid, law, shared, matter, particles, used)
+        particles, momentum, affine, own = give(config, law, shared, matter, particles, used)
         at = stencil(window, target, particles.position)
         rows = scatter(window, at, rows, matter.mass, momentum, affine)
         state = jax.tree.map(

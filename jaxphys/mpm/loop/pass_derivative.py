@@ -142,14 +142,13 @@ def _sum_over_devices(results):
 
 def _between(config: Config, last: bool, law, flags, first: Array):
     """What a pass does to some particles between its transfers, as a function of the rest."""
-    grid = config.grid
 
     def between(shared, matter, particles, flow: Flow):
         matter = whole(matter, flags)
-        moved, _, flow = move(grid, shared, matter, particles, None, flow, first)
+        moved, _, flow = move(config, shared, matter, particles, None, flow, first)
         if last:
             return moved, flow
-        return give(grid, law, shared, matter, moved, flow)
+        return give(config, law, shared, matter, moved, flow)
 
     return between
 
@@ -165,8 +164,7 @@ def _tangent_chunks(config: Config, last: bool, common, own):
     def of_chunk(law, sums, chunk):
         matter, flags, particles, gathered, of_matter, of_start, of_particles = chunk
         at = stencil(window, origin, particles.position)
-        velocity, moment = gather_tangent(window, at, nodes, of_particles.position, of_nodes)
-        flow = Flow(velocity[:3], moment)
+        flow = Flow.of(*gather_tangent(window, at, nodes, of_particles.position, of_nodes))
         if not last:
             flow = jax.tree.map(lambda a, b: jnp.where(first, a, b), of_start, flow)
         results, rates = jax.jvp(
@@ -223,8 +221,8 @@ def _cotangent_chunks(config: Config, last: bool, common, own):
             to_start = jax.tree.map(lambda x: jnp.where(first, x, 0), to_gathered)
             to_gathered = jax.tree.map(lambda x: jnp.where(first, 0, x), to_gathered)
         at = stencil(window, origin, particles.position)
-        slopes = gather_slopes(window, at, nodes, gathered.velocity, *to_gathered)
-        to_nodes = scatter(window, at, to_nodes, None, *to_gathered)
+        slopes = gather_slopes(window, at, nodes, gathered.vectors[0], *to_gathered.vectors)
+        to_nodes = scatter(window, at, to_nodes, None, *to_gathered.vectors)
         to_before = to_before._replace(position=to_before.position + slopes)
         to_shared = jax.tree.map(jnp.add, to_shared, own_shared)
         return (to_shared, to_nodes), (to_matter, to_start, to_before)

@@ -38,7 +38,8 @@ def replayed(
         return run(chunks, dt[jnp.maximum(k - 1, 0)], dt[k]), k + 1
 
     def each(carry):
-        return jax.lax.cond(carry[1] < steps, taken, lambda carry: carry, carry)
+        # The first one in any case: what was never begun would have a gradient of zero, not none.
+        return jax.lax.cond(carry[1] < jnp.maximum(steps, 1), taken, lambda carry: carry, carry)
 
     start = chunks, jnp.zeros((), jnp.int32)
     chunks, _ = repeat(adjoint, taken if known else each, start, steps if known else places)

@@ -15,7 +15,6 @@ from jaxphys.core import compensated
 from jaxphys.core.errors import InputError
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
-from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop import rigid_body
 from jaxphys.mpm.loop.adjoint import Adjoint, Plain, repeat
 from jaxphys.mpm.loop.chunks import Cut, cut, cuts, joined, numbers, orders
@@ -211,7 +210,7 @@ def prepared(config: Config, model: Model, state: State) -> Passes:
     check_fit(config, model, state)
     model = with_wave_modulus(config, model)
     segments = cuts(config.runs, config.placement)
-    order, inverse = orders(state.position, config.grid, config.runs)
+    order, inverse = orders(state.position, config.grid, config.runs, config.kernel)
     matter, flags = numbers_and_flags(matter_of(config, model, segments, order))
     return Passes(
         config,
@@ -222,7 +221,7 @@ def prepared(config: Config, model: Model, state: State) -> Passes:
         inverse,
         matter,
         flags,
-        flows_of(config.grid, state, segments, order),
+        flows_of(config, state, segments, order),
         tuple(numbers(into, order) for into in segments),
         tuple(boundary.shared() for boundary in model.boundaries),
         jnp.finfo(state.position.dtype).eps ** 2 * jnp.max(model.mass),
@@ -260,10 +259,13 @@ def matter_of(config, model, segments, order) -> tuple[Matter, ...]:
     return tuple(found)
 
 
-def flows_of(grid: Grid, state: State, segments, order) -> tuple[Flow, ...]:
+def flows_of(config: Config, state: State, segments, order) -> tuple[Flow, ...]:
     """The flow that a state holds, one for each run, in chunks."""
-    moment = state.affine * (grid.spacing**2 / 4)
-    return tuple(cut(Flow(state.velocity, moment), into, order) for into in segments)
+    moment = state.affine * (config.grid.spacing**2 / config.kernel.inverse_inertia)
+    # Before the first step no force has acted.
+    before = state.velocity if config.transfer.keeps_velocity else None
+    flow = Flow(state.velocity, moment, before)
+    return tuple(cut(flow, into, order) for into in segments)
 
 
 def cut_state(config: Config, state: State, segments, order) -> Chunks:
@@ -272,6 +274,8 @@ def cut_state(config: Config, state: State, segments, order) -> Chunks:
     rest = None if state.residual is None else state.residual._replace(time=None)
     for (law, _, _), into in zip(config.runs, segments, strict=True):
         own = Particles(state.position, state.deformation, state.total, None, state.slip)
+        if config.transfer.keeps_velocity:
+            own = own._replace(velocity=state.velocity)
         own = cut(own, into, order)
         if law.history and state.history is not None:
             with part("history"):
@@ -281,7 +285,7 @@ def cut_state(config: Config, state: State, segments, order) -> Chunks:
     return Chunks(
         tuple(particles),
         tuple(residuals),
-        jnp.zeros((config.computed.nodes, 4), state.position.dtype),
+        jnp.zeros((config.computed.nodes, config.transfer.columns), state.position.dtype),
         jnp.zeros(3, jnp.int32),
         extent(config, jax.lax.stop_gradient(state.position)),
         slowest(config, *jax.lax.stop_gradient((state.velocity, state.affine))),
@@ -302,7 +306,7 @@ def window_origin(config: Config, below: Array | None) -> Array:
     lowest, highest = below[:3], -below[3:]
     shape = np.array(config.nodes, np.int32)
     room = np.array(config.grid.shape, np.int32) - shape
-    free = shape - 3 - (highest - lowest)
+    free = shape - config.kernel.width - (highest - lowest)
     return jnp.clip(lowest - jnp.maximum(free, 0) // 2, 0, room)
 
 
@@ -330,7 +334,7 @@ def join_state(config: Config, before: State, chunks: Chunks, segments, inverse)
     state = State(
         position=particles.position,
         velocity=flow.velocity,
-        affine=velocity_gradient(config.grid, flow),
+        affine=velocity_gradient(config, flow),
         deformation=particles.deformation,
         total=particles.total,
         history=history,

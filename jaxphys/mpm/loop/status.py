@@ -20,7 +20,6 @@ from jaxphys.mpm.state import (
     Config,
     Status,
 )
-from jaxphys.mpm.transfer import base_node, inside
 
 LANES = 16
 COLLAPSE = 1e-3  # share of its volume below which a particle counts as collapsed
@@ -113,7 +112,7 @@ def failure(
 
     origin: of the window (3,); before: positions (3, N) from which the step started.
     """
-    grid = config.grid
+    grid, kernel = config.grid, config.kernel
     # Sums written out: a reduction within a fusion is not vectorised.
     v, c, f = (algebra.numbers(x) for x in (velocity, C, F))
     finite = jnp.isfinite(algebra.total(v) + algebra.total(f))
@@ -123,10 +122,10 @@ def failure(
     code = jnp.full(finite.shape, OK, jnp.int32)
     if config.nodes != grid.shape:
         # A particle outside of the window was clamped in the transfers of this very step.
-        room = jnp.array(config.nodes, jnp.int32)[:, None] - 3
-        local = base_node(before, grid.spacing, grid.shape) - origin[:, None]
+        room = jnp.array(config.nodes, jnp.int32)[:, None] - kernel.width
+        local = kernel.base_node(before, grid.spacing, grid.shape) - origin[:, None]
         code = jnp.where(jnp.all((local >= 0) & (local <= room), axis=0), code, LEFT_WINDOW)
-    code = jnp.where(inside(position, grid.spacing, grid.shape), code, LEFT_GRID)
+    code = jnp.where(kernel.inside(position, grid.spacing, grid.shape), code, LEFT_GRID)
     code = jnp.where(volume < COLLAPSE, COLLAPSED, code)
     code = jnp.where(volume <= 0, INVERTED, code)
     code = jnp.where(slow, code, STEP_TOO_LARGE)

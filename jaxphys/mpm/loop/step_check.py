@@ -66,7 +66,7 @@ def weakest(config: Config, own) -> tuple[Array, Array]:
         matter = whole(matter, flags)
         parameters = law.present(matter.parameters, history)
         density = matter.mass / jnp.where(matter.mass > 0, matter.volume, 1)
-        limits = hard_limit(law, parameters, F, density, config.grid.spacing)
+        limits = hard_limit(law, parameters, F, density, config.grid.spacing, config.transfer)
         # NaN counts as the least of all.
         limits = jnp.where(jnp.isnan(limits), -1, limits)
         lowest = least(limits)

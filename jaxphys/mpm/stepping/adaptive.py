@@ -18,6 +18,7 @@ from jax import Array
 from jaxphys.core.fields import Checked, between
 from jaxphys.mpm.materials.law import Law, Parameters
 from jaxphys.mpm.stepping import bounds, fixed
+from jaxphys.mpm.transfer.schemes import Transfer
 
 LEAST = fixed.SAFETY * bounds.SAFETY
 GROWTH = 1.5  # from one look to the next; a step shrinks at once
@@ -56,11 +57,12 @@ def matter_bounds(
     density: Array,
     spacing: float,
     safety: float,
+    transfer: Transfer = bounds.DEFAULT,
 ) -> tuple[Array, Array]:
     """(wanted, limit) [s] of each particle, (...): the step to take, if matter alone decides, and
     the one beyond which it is unstable as it is now deformed.
     """
-    limit = bounds.hard_limit(law, parameters, F, density, spacing)
+    limit = bounds.hard_limit(law, parameters, F, density, spacing, transfer)
     swing = jnp.max((bounds.principal_stretches(F) - 1) ** 2, axis=0) / bounds.SWING**2
     share = jnp.maximum(LEAST / bounds.SAFETY, 1 / jnp.sqrt(1 + swing))
     return safety * share * limit, limit

@@ -57,6 +57,7 @@ from jaxphys.mpm.stepping.implicit_solve import (
     newton,
     residual,
 )
+from jaxphys.mpm.transfer.schemes import Transfer
 
 ADVECTION = 0.6  # cells that a particle may cross in a step (Wang et al. 2020)
 GRADIENT = 0.5  # by which it may be deformed
@@ -134,6 +135,11 @@ class Bodies(NamedTuple):
 
 def _refuse(config: Config, model: Model) -> None:
     """Raises `InputError` for what no implicit step can take."""
+    if config.transfer != Transfer():
+        raise InputError(
+            "Implicit: steps are solved with APIC and quadratic splines; leave Config.transfer as "
+            "it is, or take explicit steps"
+        )
     for law, _, _ in config.runs:
         if law.energy is None or law.viscosity is not None:
             raise InputError(
@@ -397,7 +403,7 @@ def taken_apart(config: Config, model: Model, state: State):
         stiffnesses(config, *still),
         jax.lax.stop_gradient(jnp.finfo(state.position.dtype).eps ** 2 * jnp.max(model.mass)),
     )
-    flows = flows_of(config.grid, state, segments, order)
+    flows = flows_of(config, state, segments, order)
     moving = Moving(chunks.particles, chunks.residuals, flows)
 
     def put(moving: Moving, time, status: Status) -> State:

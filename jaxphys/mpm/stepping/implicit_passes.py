@@ -126,7 +126,7 @@ def begin(
     """Momentum and mass rows (M, 4), mass times stiffness of nodes (M, 1), and what stands still:
     laws are past their return map, pushes are given.
     """
-    window, grid = config.computed, config.grid
+    window = config.computed
 
     def body(law, start, carry, chunk):
         (rows, heavy), none = carry
@@ -162,7 +162,7 @@ def begin(
                 shared.dt,
             )
             momentum = momentum + given
-        affine = matter.mass * velocity_gradient(grid, flow)
+        affine = matter.mass * velocity_gradient(config, flow)
         place = particles.position
         rows = to_nodes(window, start.origin, place, rows, matter.mass, momentum, affine)
         fixed = jax.lax.stop_gradient((place, matter.mass, stiffness))
@@ -246,7 +246,7 @@ def evaluate(config: Config, start: Start, rest: tuple[Rest, ...], velocities: A
         F, history = particles.deformation, _history(particles, matter)
         place = particles.position
         velocity, moment = to_particles(window, start.origin, place, velocities)
-        turn = start.stage * velocity_gradient(grid, Flow(velocity, moment))
+        turn = start.stage * velocity_gradient(config, Flow(velocity, moment))
         with part(f"law {law.name}"):
             response = pulled_back(law, matter.parameters, F, history, turn)
             after = algebra.matmul(turn, F) + F
@@ -287,7 +287,7 @@ def linearise(
         F, history = particles.deformation, _history(particles, matter)
         place, D = particles.position, 4 / grid.spacing**2
         velocity, moment = to_particles(window, start.origin, place, velocities)
-        turn = h * velocity_gradient(grid, Flow(velocity, moment))
+        turn = h * velocity_gradient(config, Flow(velocity, moment))
         with part(f"law {law.name}"):
             _, stiffness = tangent(law, matter.parameters, F, history, turn)
         stiffness = jnp.where(matter.mass > 0, (h * D) ** 2 * matter.volume * stiffness, 0)
@@ -362,7 +362,7 @@ def finish(
     velocities: (M, 4) [m/s] that move and deform; end: (M, 4) those at the end of the step, which
     particles keep, or None where they are the same.
     """
-    window, grid = config.computed, config.grid
+    window = config.computed
 
     def body(law, common, carry, chunk):
         none, fault = carry
@@ -371,14 +371,14 @@ def finish(
         shared, matter, before = start.shared, rest.matter, rest.particles
         place = before.position
         flow = Flow(*to_particles(window, start.origin, place, velocities))
-        after, residual, flow = move(grid, shared, matter, before, residual, flow, False)
+        after, residual, flow = move(config, shared, matter, before, residual, flow, False)
         code = failure(
             config,
             start.origin,
             place,
             after.position,
             flow.velocity,
-            velocity_gradient(grid, flow),
+            velocity_gradient(config, flow),
             after.deformation,
             shared.dt,
         )

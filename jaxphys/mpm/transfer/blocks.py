@@ -12,7 +12,7 @@ def scatter_blocks(
     window: Window, at: Stencil, blocks: Array, stiffness: Array, spring: Array | None
 ) -> Array:
     """`blocks` (M, 6) and what particles add to them: the part of a second derivative that belongs
-    to one node, packed.
+    to one node, packed. Of quadratic splines.
 
     Where velocities u act on a particle by sum w u and by sum w u d^T, and an energy of these has
     the second derivatives `spring` and `stiffness`, the block of a node is w^2 spring and

@@ -81,7 +81,7 @@ def test_a_bar_pulled_in_small_steps():
     for plastic in np.linspace(0, 0.3, 31):
         total, stress = pulled(plastic, METAL)
         F = jnp.asarray(np.diag(np.exp(total - before)))[:, :, None] * F
-        F, tau, history = update(values, F, history)
+        F, tau, history = update(values, F, history, DT)
         before = total
         np.testing.assert_allclose(np.diag(tau[:, :, 0]), [stress, 0, 0], atol=1e-12)
         assert float(history[0, 0]) == pytest.approx(plastic, abs=1e-12)
@@ -134,8 +134,8 @@ def test_von_mises_simple_shear_strength():
 def test_return_maps_are_idempotent(law, values, dtype):
     F = jnp.asarray(samples(), dtype)
     update = jax.jit(law.update)
-    first = update(arrays(values, dtype), F, jnp.zeros((1, F.shape[-1]), dtype))
-    again = update(arrays(values, dtype), first[0], first[2])
+    first = update(arrays(values, dtype), F, jnp.zeros((1, F.shape[-1]), dtype), DT)
+    again = update(arrays(values, dtype), first[0], first[2], DT)
     eps = np.finfo(dtype).eps
     for a, b in zip(first, again, strict=True):
         assert a.dtype == dtype

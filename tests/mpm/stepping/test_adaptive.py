@@ -48,7 +48,8 @@ def stiff(modulus=2e4, **options):
     parameters = model.parameters | {
         "youngs_modulus": modulus / 1e3 * model.parameters["youngs_modulus"]
     }
-    return config, replace(model, parameters=parameters), state
+    # What turns this fast is slowed within a frame, and lets the steps grow.
+    return config, replace(model, parameters=parameters), state._replace(affine=15 * state.affine)
 
 
 def limits(config, model, state):
@@ -71,8 +72,12 @@ def test_a_frame_is_hit_exactly_in_steps_that_the_bounds_allow(taken):
     config, model, state, end, dt = taken
     assert 4 < len(dt) == int(end.status.taken) < ROOM
     np.testing.assert_allclose([dt.sum(), float(end.time)], DURATION, rtol=1e-12)
+    speed = np.linalg.norm(state.velocity, axis=0).max()
+    rate = np.linalg.norm(state.affine, axis=(0, 1)).max()
     wanted, _ = limits(config, model, state)
-    assert dt[0] <= wanted.min() and dt[0] > 0.8 * wanted.min()
+    bound = min(float(wanted.min()), 0.8 * 0.5 * 0.1 / speed, 0.8 * 0.2 / rate)
+    assert 0.8 * bound < dt[0] <= bound * (1 + 1e-6)
+    assert np.ptp(dt) > 0.2 * dt[0]
     # All steps that one look decides are of one length.
     blocks = [dt[k : k + EVERY] for k in range(0, len(dt), EVERY)]
     assert all(np.ptp(one) == 0 for one in blocks)
@@ -191,11 +196,12 @@ def test_the_gradient_is_that_of_the_realised_steps(loss, taken):
 @pytest.mark.parametrize("adjoint", [Plain(), Checkpointed()], ids=repr)
 def test_the_gradient_of_frames_that_failed_is_not_a_number(loss, adjoint):
     run, velocity = loss
-    # A thousand times as stiff, the frame takes more steps than there is room for.
+    # A thousand times as stiff, it flies apart within the room for steps that there is.
     (value, motion), gradients = run(1e3, velocity, adjoint=adjoint)
     assert np.isnan(value) and all(np.isnan(g).all() for g in gradients)
-    assert [int(c) for c in motion.status.code] == [OK, TOO_MANY_STEPS, TOO_MANY_STEPS]
-    with pytest.raises(SimulationError, match=r"frame 1, step \d+: particle \d+ keeps the steps"):
+    first, *others = (int(c) for c in motion.status.code)
+    assert first == OK and OK not in others
+    with pytest.raises(SimulationError, match=r"frame 1, step \d+: particle \d+"):
         motion.check()
     # Off the grid in the first frame.
     (value, motion), gradients = run(1.0, velocity.at[2].set(-100.0), adjoint=adjoint)
@@ -228,7 +234,7 @@ def _locking_stress(e, moduli):
     return (2 * mu * e + 4 * mu * e**3,), ()
 
 
-def _locking_update(parameters, F, history):
+def _locking_update(parameters, F, history, dt):
     ((stress,), _) = left_isotropic(_locking_stress, F, lame(parameters))
     return F, stress, history
 
@@ -244,12 +250,12 @@ LOCKING = replace(HENCKY, name="locking", update=_locking_update, principal_ener
 
 
 def pressed():
-    """A lattice of what locks, on a floor, and a plate that comes down to a third of its height."""
+    """A lattice of what locks, on a floor that holds it, and a plate that comes down on it."""
     line = 0.3 + 0.05 * np.arange(4)
     position = np.stack(np.meshgrid(line, line, line, indexing="ij"), -1).reshape(-1, 3)
     volume = np.full(64, 0.05**3)
-    floor = Plane((0.0, 0.0, 0.275), surface="slip", friction=0.0)
-    plate = Plane((0.0, 0.0, 0.475), (0.0, 0.0, -1.0), friction=0.0, velocity=(0, 0, -1.0))
+    floor = Plane((0.0, 0.0, 0.25), surface="sticky")
+    plate = Plane((0.0, 0.0, 0.5), (0.0, 0.0, -1.0), surface="sticky", velocity=(0, 0, -1.0))
     grid = Grid((9, 10, 11), 0.1)
     boundaries = prepare((floor, plate), Setting(grid, position, volume, np.dtype(float)))
     config = Config(grid, ((LOCKING, 0, 64),))
@@ -268,21 +274,16 @@ def test_a_block_pressed_by_a_plate_does_not_outrun_its_step():
     config, model, state = pressed()
     duration = 0.02
     fixed, steps, _ = choose_substep(config, model, state, duration)
-    now, equal, most = state, state, 0
-    for _ in range(6):
+    now = equal = state
+    for frame in range(12):
         now, taken = frame_of_pressed(config, model, now, duration=duration)
-        check(now.status)
-        most = max(most, int(taken.count))
-        if int(equal.status.code) == OK:
-            equal = advance_frame(config, model, equal, fixed, steps)
-    assert float(jnp.ptp(now.position[2])) < 0.5 * float(jnp.ptp(state.position[2]))
+        check(now.status, frame)
+        equal = advance_frame(config, model, equal, fixed, steps)
+        if int(equal.status.code) != OK:
+            break
+    assert int(equal.status.code) == UNSTABLE_STEP
     assert float(jnp.min(limits(config, model, now)[1])) < fixed
-    assert most > 1.5 * steps
-    assert int(equal.status.code) != OK
-    # Control: looked at once a frame, it is found out, and not gone on with.
-    rarely = jax.jit(partial(rollout_adaptively, stepping=Adaptive(every=1000)), static_argnums=0)
-    end, _ = rarely(config, model, state, duration=6 * duration)
-    assert int(end.status.code) != OK
+    assert int(taken.count) > 1.3 * steps
 
 
 def test_a_step_grows_by_half_from_look_to_look_and_shrinks_at_once():
