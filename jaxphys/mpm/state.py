@@ -10,7 +10,7 @@ from jax import Array
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.loop.placement import Placement
+from jaxphys.mpm.loop.placement import Placement, Slabs
 from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.transfer.stencil import Window
 
@@ -45,6 +45,8 @@ class Config:
     tells_rates: a pass tells how fast its particles move and deform (`Seen.rates`), for steps that
         adapt.
     placement: in which chunks and on which devices particles are computed.
+    slabs: how devices share the window, or None where each has all of it. A slab follows the
+        particles of its device; if they outgrow it, the status says so.
     """
 
     grid: Grid
@@ -54,6 +56,7 @@ class Config:
     check_step: bool = True
     tells_rates: bool = False
     placement: Placement = Placement()
+    slabs: Slabs | None = None
 
     def __post_init__(self):
         reached = 0
@@ -73,6 +76,15 @@ class Config:
                 f"Config.window is {self.window}: it must lie between 3 nodes and the grid's "
                 f"{self.grid.shape} on each axis."
             )
+        if self.slabs is not None:
+            most = (self.window or self.grid.shape)[0]
+            if self.placement.devices == 1:
+                raise InputError("Config.slabs: one device has the whole window; set it to None.")
+            if not 3 <= self.slabs.planes <= most:
+                raise InputError(
+                    f"Config.slabs.planes is {self.slabs.planes}: it must lie between 3 and the "
+                    f"{most} nodes of the window along x."
+                )
 
     @property
     def particles(self) -> int:
@@ -81,8 +93,19 @@ class Config:
 
     @property
     def nodes(self) -> tuple[int, int, int]:
-        """Shape of the part of the grid that is computed."""
-        return self.window or self.grid.shape
+        """Shape of the part of the grid that a device computes."""
+        shape = self.window or self.grid.shape
+        return shape if self.slabs is None else (self.slabs.planes, *shape[1:])
+
+    @property
+    def parts(self) -> int:
+        """How many such parts there are: a slab for each device, or the window."""
+        return 1 if self.slabs is None else self.placement.devices
+
+    @property
+    def follows(self) -> bool:
+        """Whether what is computed of the grid follows the particles."""
+        return self.window is not None or self.slabs is not None
 
     @property
     def runs(self) -> tuple[tuple[Law, int, int], ...]:
@@ -96,7 +119,7 @@ class Config:
 
     @property
     def computed(self) -> Window:
-        """The part of the grid that is computed, for transfers."""
+        """The part of the grid that a device computes, for transfers."""
         return Window(self.nodes, self.grid.spacing, self.grid.shape)
 
     @property

@@ -66,11 +66,12 @@ def blend_tangent(grid, settings, residuals, tangents):
         The tangent of the blended features, shape (tiles, F, tile_size^2).
     """
     table, work, boxes, lists, _ = residuals
+    geometry, features = tangents
 
     def totals(table: Array) -> Array:
         return _totals(table, boxes, lists, work, grid, settings)
 
-    return jax.jvp(totals, (table,), (by_rank(*tangents, boxes),))[1]
+    return jax.jvp(totals, (table,), (by_rank(geometry, features, boxes),))[1]
 
 
 def by_rank(geometry: Array, features: Array, boxes: Boxes) -> Array:
