@@ -8,7 +8,7 @@ import statistics
 import time
 from importlib import metadata
 
-SUITES = ("mpm", "mpm-grad", "scaling", "render", "headline", "order")
+SUITES = ("mpm", "mpm-grad", "scaling", "render", "drawing", "headline", "order", "implicit")
 MINIMUM_CALLS = 3
 
 

@@ -1,4 +1,4 @@
-"""The five materials, each on an object it suits, without any trained prior.
+"""The materials, each on an object it suits, without any trained prior.
 
     python -m experiments.showcase jelly --out outputs/showcase
     python -m experiments.showcase all --sheets docs/figures
@@ -25,6 +25,14 @@ OBJECTS = {
     "metal": "can",
     "sand": "ice cream",
     "fracture": "sponge",
+    "water": "apple",
+    "cream": "cupcake",
+    "toothpaste": "egg",
+    "plasticine": "teddy bear",
+    "snow": "snowman",
+    "wet-sand": "castle",
+    "memory-foam": "pillow",
+    "muscle": "egg",
 }
 
 

@@ -11,14 +11,23 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .core.ensemble import over_devices as over_devices
     from .core.errors import InputError as InputError
+    from .fitting.fit import fit as fit
     from .gaussians.gaussians import Gaussians as Gaussians
     from .mpm.loop.adjoint import Checkpointed as Checkpointed
     from .mpm.loop.adjoint import Plain as Plain
+    from .mpm.loop.adjoint import Truncated as Truncated
     from .mpm.loop.frames import rollout_frames as rollout_frames
     from .mpm.loop.status import SimulationError as SimulationError
+    from .mpm.materials.deriving import law_of_gradient as law_of_gradient
+    from .mpm.materials.deriving import law_of_stretches as law_of_stretches
+    from .mpm.materials.deriving import law_of_volume as law_of_volume
+    from .mpm.materials.parameters import Parameter as Parameter
+    from .mpm.materials.registering import register_material as register_material
     from .mpm.motion import Frame as Frame
     from .mpm.motion import Motion as Motion
     from .mpm.simulation import Simulation as Simulation
+    from .mpm.stepping import Adaptive as Adaptive
+    from .mpm.stepping import Fixed as Fixed
     from .pipeline.animate import animate as animate
     from .pipeline.draw import draw as draw
     from .pipeline.frames import frames as frames
@@ -38,14 +47,23 @@ if TYPE_CHECKING:
 _HOMES = {
     "over_devices": "core.ensemble",
     "InputError": "core.errors",
+    "fit": "fitting.fit",
     "Gaussians": "gaussians.gaussians",
     "Checkpointed": "mpm.loop.adjoint",
     "Plain": "mpm.loop.adjoint",
+    "Truncated": "mpm.loop.adjoint",
     "rollout_frames": "mpm.loop.frames",
+    "law_of_gradient": "mpm.materials.deriving",
+    "law_of_stretches": "mpm.materials.deriving",
+    "law_of_volume": "mpm.materials.deriving",
+    "Parameter": "mpm.materials.parameters",
+    "register_material": "mpm.materials.registering",
     "Frame": "mpm.motion",
     "Motion": "mpm.motion",
     "SimulationError": "mpm.loop.status",
     "Simulation": "mpm.simulation",
+    "Adaptive": "mpm.stepping",
+    "Fixed": "mpm.stepping",
     "animate": "pipeline.animate",
     "draw": "pipeline.draw",
     "frames": "pipeline.frames",

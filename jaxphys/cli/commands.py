@@ -24,6 +24,7 @@ def generate(
     frames: int | None = None,
     steps: int | None = None,
     splats: int | None = None,
+    stepping: Literal["adaptive", "fixed"] | None = None,
     prior: str | None = None,
     shape_prior: str | None = None,
     negative: str | None = None,
@@ -46,6 +47,7 @@ def generate(
         frames: Number of pictures. Default: 48.
         steps: Steps of optimisation.
         splats: Number of Gaussians at most.
+        stepping: Time steps that adapt to what the motion allows, or equal ones. Default: adaptive.
         prior: Judges pictures: bundled, stable-diffusion, stable-diffusion-2.1-base,
             stable-diffusion-2.1, or a folder in diffusers' layout. Or library: no prior, but the
             parametric model that the words mean; `jaxphys priors` lists them. Default: bundled.
@@ -59,10 +61,11 @@ def generate(
         save_splats: Also write one .ply for each picture.
         overwrite: Replace the files of an earlier run of another request, and only these.
     """
-    from jaxphys.cli.scenes import files_read, scene_for
+    from jaxphys.cli.scenes import files_read, scene_for, stepping_for
     from jaxphys.pipeline.generate import generate as run
 
     changes = {"seed": seed, "width": width, "height": height, "frames": frames}
+    changes |= stepping_for(stepping)
     scene = scene_for(config, material, changes)
     run(
         prompt,
@@ -150,6 +153,7 @@ def animate(
     height: int | None = None,
     frames: int | None = None,
     splats: int | None = None,
+    stepping: Literal["adaptive", "fixed"] | None = None,
     substep: float | None = None,
     unsafe_dt: bool = False,
     save_splats: bool = False,
@@ -168,15 +172,17 @@ def animate(
         height: Of the video [pixels]. Default: 1090.
         frames: Number of pictures. Default: 48.
         splats: Number of Gaussians that a mesh becomes. Default: 20000.
-        substep: Time step [s]. Default: as large as is safe.
+        stepping: Time steps that adapt to what the motion allows, or equal ones. Default: adaptive.
+        substep: Time step [s], which makes steps equal. Default: as large as is safe.
         unsafe_dt: Take --substep even if it is beyond what is stable.
         save_splats: Also write one .ply for each picture.
         overwrite: Replace the files of an earlier run of another request, and only these.
     """
-    from jaxphys.cli.scenes import files_read, scene_for, with_source
+    from jaxphys.cli.scenes import files_read, scene_for, stepping_for, with_source
     from jaxphys.pipeline.animate import animate as run
 
     changes = {"seed": seed, "width": width, "height": height, "frames": frames, "substep": substep}
+    changes |= stepping_for(stepping, substep)
     scene = scene_for(config, material, changes, source)
     if unsafe_dt:
         scene = scene_for(None, None, {"unsafe_substep": True}, base=scene)
@@ -294,15 +300,16 @@ def plan(
     return 0
 
 
-def materials(*, json: bool = False) -> int:
+def materials(*, json: bool = False, markdown: bool = False) -> int:
     """List the materials, their parameters and defaults.
 
     Args:
         json: Print JSON.
+        markdown: Print tables, as docs/materials.md has them.
     """
-    from jaxphys.cli.listing import materials_text
+    from jaxphys.cli.listing import materials_markdown, materials_text
 
-    print(materials_text(as_json=json))
+    print(materials_markdown() if markdown else materials_text(as_json=json))
     return 0
 
 

@@ -3,18 +3,18 @@
 import json
 import textwrap
 
-from jaxphys.mpm.materials.catalogue import MATERIALS, Material
-from jaxphys.mpm.materials.parameters import ALTERNATIVES, RANGES
+from jaxphys.mpm.materials.catalogue import MATERIALS, Material, declared_parameters
+from jaxphys.mpm.materials.parameters import Parameter
 
 
-def _explained(name: str) -> dict:
-    allowed = RANGES[name]
-    return {"meaning": allowed.meaning, "unit": allowed.unit, "range": allowed.text}
+def _explained(one: Parameter) -> dict:
+    return {"meaning": one.meaning, "unit": one.unit, "range": one.text}
 
 
 def _as_json(material: Material) -> dict:
     parameters = {
-        name: {"default": value} | _explained(name) for name, value in material.defaults.items()
+        name: {"default": value} | _explained(material.declared[name])
+        for name, value in material.defaults.items()
     }
     return {
         "description": material.description,
@@ -22,8 +22,8 @@ def _as_json(material: Material) -> dict:
         "other_laws": [law.name for law in material.others],
         "parameters": parameters
         | {
-            name: {"instead_of": ALTERNATIVES[name].name} | _explained(name)
-            for name in material.alternatives
+            name: {"instead_of": other.instead_of} | _explained(other.parameter)
+            for name, other in material.alternatives.items()
         },
     }
 
@@ -31,17 +31,32 @@ def _as_json(material: Material) -> dict:
 def _material_lines(material: Material) -> list[str]:
     lines = [f"{material.name}: {material.description}"]
     for name, value in material.defaults.items():
-        lines.append(f"  {name:17} {value:<9g} {RANGES[name].unit}".rstrip())
+        lines.append(f"  {name:17} {value:<9g} {material.declared[name].unit}".rstrip())
     others = ", ".join(law.name for law in material.others)
     return [*lines, f"  law: {material.law.name}" + (f"; or {others}" if others else "")]
 
 
-def _meaning_lines(name: str) -> list[str]:
-    allowed = RANGES[name]
-    instead = f" (in place of {ALTERNATIVES[name].name})" if name in ALTERNATIVES else ""
-    unit = f" {allowed.unit}" if allowed.unit else ""
-    text = f"{name}{instead}, {allowed.text}{unit}: {allowed.meaning}"
+def _meaning_lines(one: Parameter, instead_of: dict[str, str]) -> list[str]:
+    instead = f" (in place of {instead_of[one.name]})" if one.name in instead_of else ""
+    unit = f" {one.unit}" if one.unit else ""
+    text = f"{one.name}{instead}, {one.text}{unit}: {one.meaning}"
     return textwrap.wrap(text, 96, initial_indent="  ", subsequent_indent="    ")
+
+
+def materials_markdown() -> str:
+    """The two tables of docs/materials.md: the materials, and what their parameters mean."""
+    lines = ["| material | what it is | law; others | defaults |", "|---|---|---|---|"]
+    for material in MATERIALS.values():
+        laws = "; ".join([f"**{material.law.name}**", *(law.name for law in material.others)])
+        defaults = ", ".join(
+            f"`{name}` {value:g} {material.declared[name].unit}".rstrip()
+            for name, value in material.defaults.items()
+        )
+        lines.append(f"| `{material.name}` | {material.description} | {laws} | {defaults} |")
+    lines += ["", "| parameter | unit | range | meaning |", "|---|---|---|---|"]
+    for one in declared_parameters().values():
+        lines.append(f"| `{one.name}` | {one.unit} | {one.text} | {one.meaning} |")
+    return "\n".join(lines)
 
 
 def materials_text(as_json: bool = False) -> str:
@@ -53,4 +68,11 @@ def materials_text(as_json: bool = False) -> str:
         return json.dumps(listed, indent=2)
     lines = [line for material in MATERIALS.values() for line in _material_lines(material)]
     lines.append("what they mean:")
-    return "\n".join(lines + [line for name in RANGES for line in _meaning_lines(name)])
+    instead_of = {
+        name: other.instead_of
+        for material in MATERIALS.values()
+        for name, other in material.alternatives.items()
+    }
+    for one in declared_parameters().values():
+        lines += _meaning_lines(one, instead_of)
+    return "\n".join(lines)

@@ -8,6 +8,7 @@ from typing import Any
 from jaxphys.core.errors import InputError, one_line
 from jaxphys.core.reading import reading
 from jaxphys.mpm.materials.catalogue import get_material
+from jaxphys.mpm.stepping import Adaptive, Fixed
 from jaxphys.scene.build import validate
 from jaxphys.scene.defaults import default_scene
 from jaxphys.scene.model_folder import is_trained, splats_in
@@ -54,6 +55,13 @@ def scene_for(
         return dataclasses.replace(scene, **given)
     except InputError as error:
         raise InputError(f"--{error}") from None
+
+
+def stepping_for(name: str | None, substep: float | None = None) -> dict[str, Any]:
+    """The change of a scene for `--stepping`; a `--substep` is a fixed step."""
+    if name is None:
+        return {} if substep is None else {"stepping": Fixed()}
+    return {"stepping": {"adaptive": Adaptive, "fixed": Fixed}[name]()}
 
 
 def files_read(config: Path | None, source: Path | None = None) -> tuple[Path, ...]:

@@ -31,8 +31,8 @@ NAMES = {float: "a number", int: "a whole number", bool: "true or false", str: "
 def from_json(cls: type[T], value: Any, where: str, unknown: Unknown | None = None) -> T:
     """A dataclass out of decoded JSON.
 
-    Types of fields may be: bool, int, float, str, Literal, dataclasses, dict[str, float], tuples
-    of these, unions with None, of plain types, or of dataclasses told apart by `type`. Whole
+    Types of fields may be: bool, int, float, str, Literal, dataclasses, dict[str, T] and
+    tuples of these, unions with None, of plain types, or of dataclasses told apart by `type`. Whole
     numbers may be written as 1e5.
 
     Args:
@@ -96,7 +96,7 @@ def _read(kind: Any, value: Any, where: str, rules: Mapping[str, Any]) -> Any:
     if origin is dict:
         if not isinstance(value, Mapping):
             _fail(where, "an object { ... }", value)
-        return {key: _read(float, part, _at(where, key), rules) for key, part in value.items()}
+        return {key: _read(parts[1], part, _at(where, key), rules) for key, part in value.items()}
     if origin is typing.Literal:
         if not isinstance(value, str) or value not in parts:
             raise InputError(f"{where}: unknown value {shown(value)}; {nearest(str(value), parts)}")

@@ -14,7 +14,9 @@ from jaxphys.core.errors import InputError
 AXIS = "members"
 
 
-def over_devices(function: Callable, devices: int | None = None) -> Callable:
+def over_devices(
+    function: Callable, devices: int | None = None, *, in_turn: bool = False
+) -> Callable:
     """`function` of one member as a function of many, each device computing its share of them.
 
     Arguments and results get a leading axis, as with `jax.vmap`; any number of members does, and
@@ -22,9 +24,13 @@ def over_devices(function: Callable, devices: int | None = None) -> Callable:
 
         ends = jaxphys.over_devices(lambda E: simulate_with(E).position)(moduli)
 
+    What is the same for all members may be closed over, traced or not; gradients reach it too.
+
     Args:
         function: of pytrees of arrays.
         devices: how many, the first ones; None: all.
+        in_turn: whether a device takes its members one after the other, instead of all of them in
+            lockstep. For what has loops of its own that end when they are done, as pictures have.
 
     Raises:
         InputError: there are fewer devices, or arguments disagree about the number of members.
@@ -35,6 +41,14 @@ def over_devices(function: Callable, devices: int | None = None) -> Callable:
         raise InputError(f"over_devices: {count} devices, but JAX has {len(found)}")
     mesh = Mesh(np.array(found[:count]), (AXIS,))
     spec = PartitionSpec(AXIS)
+
+    def each(*arguments: Any) -> Any:
+        if all(leaf.shape[0] == 1 for leaf in jax.tree.leaves(arguments)):
+            alone = function(*jax.tree.map(lambda x: x[0], arguments))
+            return jax.tree.map(lambda x: jnp.asarray(x)[None], alone)
+        if in_turn:
+            return jax.lax.map(lambda member: function(*member), arguments)
+        return jax.vmap(function)(*arguments)
 
     def of_many(*arguments: Any) -> Any:
         sizes = {jnp.shape(leaf)[:1] for leaf in jax.tree.leaves(arguments)}
@@ -47,9 +61,7 @@ def over_devices(function: Callable, devices: int | None = None) -> Callable:
         # What is left over repeats the last member, on devices that would have waited.
         places = jnp.minimum(jnp.arange(count * math.ceil(members / count)), members - 1)
         filled = jax.tree.map(lambda x: jnp.asarray(x)[places], arguments)
-        share = jax.shard_map(
-            jax.vmap(function), mesh=mesh, in_specs=spec, out_specs=spec, check_vma=False
-        )
+        share = jax.shard_map(each, mesh=mesh, in_specs=spec, out_specs=spec, check_vma=False)
         return jax.tree.map(lambda x: x[:members], share(*filled))
 
     return jax.jit(of_many)

@@ -47,6 +47,7 @@ LENGTH = {"above": 0} | between(1e-9, 1e6)
 TIME = between(-1e9, 1e9)
 DURATION = {"above": 0} | between(1e-12, 1e9)
 SPEED = between(-1e8, 1e8)
+RATE = between(-1e6, 1e6)
 SEED = between(0, 2**31 - 1)
 
 

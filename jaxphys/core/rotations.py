@@ -3,6 +3,8 @@
 import jax.numpy as jnp
 from jax import Array
 
+_SMALL = 1e-8  # squares of angles below which two terms of a series are exact
+
 
 def normalise_quaternion(quaternions: Array) -> Array:
     """Unit quaternions of shape (..., 4); a zero quaternion becomes the identity, with zero
@@ -67,3 +69,44 @@ def axis_angle_to_matrix(axis: Array, angle: Array) -> Array:
     zero = jnp.zeros_like(x)
     K = jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
     return jnp.eye(3, dtype=K.dtype) + jnp.sin(angle) * K + (1 - jnp.cos(angle)) * (K @ K)
+
+
+def quaternion_product(p: Array, q: Array) -> Array:
+    """The quaternion (..., 4) that turns by q first and by p then."""
+    pw, px, py, pz = jnp.moveaxis(p, -1, 0)
+    qw, qx, qy, qz = jnp.moveaxis(q, -1, 0)
+    return jnp.stack(
+        [
+            pw * qw - px * qx - py * qy - pz * qz,
+            pw * qx + px * qw + py * qz - pz * qy,
+            pw * qy - px * qz + py * qw + pz * qx,
+            pw * qz + px * qy - py * qx + pz * qw,
+        ],
+        axis=-1,
+    )
+
+
+def rotation_vector_to_quaternion(vectors: Array) -> Array:
+    """Unit quaternions (..., 4) that turn about vectors (..., 3) by their length [rad]; smooth at
+    zero.
+    """
+    squared = jnp.sum(vectors**2, axis=-1, keepdims=True)
+    small = squared < _SMALL
+    angle = jnp.sqrt(jnp.where(small, 1.0, squared))
+    share = jnp.where(small, 0.5 - squared / 48, jnp.sin(0.5 * angle) / angle)
+    real = jnp.where(small, 1 - squared / 8, jnp.cos(0.5 * angle))
+    return jnp.concatenate([real, share * vectors], axis=-1)
+
+
+def quaternion_to_rotation_vector(quaternions: Array) -> Array:
+    """Axis times angle [rad] (..., 3) of unit quaternions (..., 4), the shorter way round; smooth
+    at the identity.
+    """
+    quaternions = jnp.where(quaternions[..., :1] < 0, -quaternions, quaternions)
+    real, vectors = quaternions[..., :1], quaternions[..., 1:]
+    squared = jnp.sum(vectors**2, axis=-1, keepdims=True)
+    small = squared < _SMALL
+    length = jnp.sqrt(jnp.where(small, 1.0, squared))
+    far = 2 * jnp.arctan2(length, jnp.where(small, 1.0, real)) / length
+    one = jnp.where(small, real, 1.0)
+    return jnp.where(small, 2 / one - 2 * squared / (3 * one**3), far) * vectors

@@ -12,7 +12,11 @@ from jax.typing import ArrayLike
 
 from jaxphys.core import algebra
 from jaxphys.core.errors import InputError
-from jaxphys.core.rotations import matrix_to_quaternion, quaternion_to_matrix
+from jaxphys.core.rotations import (
+    matrix_to_quaternion,
+    quaternion_product,
+    quaternion_to_matrix,
+)
 from jaxphys.core.splats import Splats
 from jaxphys.gaussians import harmonics as sh
 
@@ -220,21 +224,6 @@ def concatenate(parts: Sequence[Gaussians]) -> Gaussians:
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *padded)
 
 
-def _multiply(a: Array, b: Array) -> Array:
-    """Hamilton product of quaternions (..., 4): first b, then a."""
-    aw, ax, ay, az = jnp.moveaxis(a, -1, 0)
-    bw, bx, by, bz = jnp.moveaxis(b, -1, 0)
-    return jnp.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        axis=-1,
-    )
-
-
 @jax.jit
 def transform(
     gaussians: Gaussians,
@@ -260,7 +249,7 @@ def transform(
         # A zero quaternion stands for no rotation, and its product would stay zero.
         absent = jnp.sum(quaternions**2, axis=-1, keepdims=True) == 0
         identity = jnp.array([1, 0, 0, 0], dtype)
-        quaternions = _multiply(
+        quaternions = quaternion_product(
             matrix_to_quaternion(rotation), jnp.where(absent, identity, quaternions)
         )
         harmonics = sh.rotate(harmonics, rotation)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.files import atomic_path
 from jaxphys.core.reading import reading
 
 # glTF prescribes y up, and most .obj exporters write it; CAD and scanning formats have z up.
@@ -179,6 +180,25 @@ def load_mesh(path: str | os.PathLike, *, up: str | None = None) -> Mesh:
         )
         _require_solid(path, mesh)
         return mesh
+
+
+def write_triangles(path: str | os.PathLike, triangles: np.ndarray) -> None:
+    """Writes triangles (F, 3, 3) as a .ply file that `load_mesh` reads to the last digit."""
+    count = len(triangles)
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {3 * count}",
+        *(f"property double {axis}" for axis in "xyz"),
+        f"element face {count}",
+        "property list uchar int vertex_indices",
+        "end_header",
+    ]
+    faces = np.zeros(count, [("corners", "u1"), ("index", "<i4", 3)])
+    faces["corners"], faces["index"] = 3, np.arange(3 * count).reshape(-1, 3)
+    with atomic_path(path) as aside:
+        corners = np.ascontiguousarray(triangles, "<f8").tobytes()
+        aside.write_bytes("\n".join([*header, ""]).encode() + corners + faces.tobytes())
 
 
 def _parts(path: Path, trimesh) -> list[tuple[np.ndarray, object]]:

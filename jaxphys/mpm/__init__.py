@@ -1,8 +1,10 @@
 """MLS-MPM: laws, materials, boundaries, the step, rollouts and their gradients."""
 
 from .grid import Grid as Grid
+from .loop.adaptive import rollout_adaptively as rollout_adaptively
 from .loop.adjoint import Checkpointed as Checkpointed
 from .loop.adjoint import Plain as Plain
+from .loop.adjoint import Truncated as Truncated
 from .loop.frames import advance_frame as advance_frame
 from .loop.frames import rollout_frames as rollout_frames
 from .loop.placement import Placement as Placement
@@ -13,8 +15,13 @@ from .loop.status import check as check
 from .materials.catalogue import MATERIALS as MATERIALS
 from .materials.catalogue import Material as Material
 from .materials.catalogue import get_material as get_material
+from .materials.deriving import law_of_gradient as law_of_gradient
+from .materials.deriving import law_of_stretches as law_of_stretches
+from .materials.deriving import law_of_volume as law_of_volume
 from .materials.fracture import number_of_pieces as number_of_pieces
 from .materials.law import Law as Law
+from .materials.parameters import Parameter as Parameter
+from .materials.registering import register_material as register_material
 from .motion import Frame as Frame
 from .motion import Motion as Motion
 from .simulation import Simulation as Simulation
@@ -23,6 +30,13 @@ from .state import Model as Model
 from .state import State as State
 from .state import Status as Status
 from .state import initial_state as initial_state
+from .stepping import Adaptive as Adaptive
+from .stepping import Fixed as Fixed
 from .stepping.bounds import StepBounds as StepBounds
 from .stepping.bounds import largest_stable_dt as largest_stable_dt
 from .stepping.bounds import validate_dt as validate_dt
+from .transfer.schemes import AFLIP as AFLIP
+from .transfer.schemes import APIC as APIC
+from .transfer.schemes import FLIP as FLIP
+from .transfer.schemes import PIC as PIC
+from .transfer.schemes import Transfer as Transfer

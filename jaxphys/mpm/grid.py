@@ -6,17 +6,18 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.core.errors import InputError
+from jaxphys.mpm.transfer.kernels import Kernel
 
 
 @dataclass(frozen=True)
 class Grid:
     """A regular grid whose node (i, j, k) sits at `spacing * (i, j, k)`.
 
-    shape: nodes per axis, each at least 3 (a quadratic B-spline touches three).
+    shape: nodes per axis, each at least 3, as many as a quadratic B-spline touches.
     spacing: distance between neighbouring nodes [m], positive.
     The domain is `[0, (shape - 1) * spacing]`, from the first node to the last. Particles
-    must stay where their three nodes per axis exist, half a cell from its ends:
-    `0.5 <= x / spacing < shape - 1.5`.
+    must stay where all nodes exist that their kernel reaches, `lower <= x < upper`: half a cell
+    from the ends with quadratic B-splines, one cell with cubic ones.
     """
 
     shape: tuple[int, int, int]
@@ -36,15 +37,13 @@ class Grid:
         x, y, z = ((n - 1) * self.spacing for n in self.shape)
         return x, y, z
 
-    @property
-    def lower(self) -> float:
+    def lower(self, kernel: Kernel) -> float:
         """Least coordinate a particle may have on any axis [m]."""
-        return 0.5 * self.spacing
+        return kernel.reach * self.spacing
 
-    @property
-    def upper(self) -> tuple[float, float, float]:
+    def upper(self, kernel: Kernel) -> tuple[float, float, float]:
         """Coordinates that particles must stay below, per axis [m]."""
-        x, y, z = ((n - 1.5) * self.spacing for n in self.shape)
+        x, y, z = ((n - 1 - kernel.reach) * self.spacing for n in self.shape)
         return x, y, z
 
 

@@ -6,6 +6,7 @@ what is drawn, so that no reader has to guess it from a count.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +22,15 @@ def _is_traced(status: Status) -> bool:
     return isinstance(status.code, jax.core.Tracer)
 
 
+class BodyFrame(NamedTuple):
+    """Where a rigid body is: its centre [m], (3,), and the quaternion w, x, y, z from its own axes
+    to the world's, (4,).
+    """
+
+    centre: Array
+    orientation: Array
+
+
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Frame:
@@ -33,6 +43,7 @@ class Frame:
         time: () [s].
         status: whether the simulation was sound up to here; if not, the numbers are NaN.
         carriers: which particle carries each drawn point, int32 (K,).
+        body: where the rigid body is, None if there is none.
     """
 
     position: Array
@@ -40,6 +51,7 @@ class Frame:
     time: Array
     status: Status
     carriers: Array
+    body: BodyFrame | None = None
 
     def carried(self) -> tuple[Array, Array]:
         """Positions (K, 3) [m] and deformation gradients (K, 3, 3) of the particles that carry
@@ -68,6 +80,7 @@ class Motion:
         time: (T,) [s].
         status: of each frame, arrays (T,); after a failure the frames are NaN.
         carriers: which particle carries each drawn point, int32 (K,).
+        body: where the rigid body is, (T, 3) and (T, 4), None if there is none.
     """
 
     position: Array
@@ -75,6 +88,7 @@ class Motion:
     time: Array
     status: Status
     carriers: Array
+    body: BodyFrame | None = None
 
     def __len__(self) -> int:
         return self.position.shape[0]
@@ -89,6 +103,7 @@ class Motion:
             self.time[index],
             Status(*(part[index] for part in self.status)),
             self.carriers,
+            jax.tree.map(lambda part: part[index], self.body),
         )
 
     def check(self) -> "Motion":
@@ -118,4 +133,5 @@ def join(frames: list[Frame]) -> Motion:
         library.stack([frame.time for frame in frames]),
         Status(*(library.stack(parts) for parts in zip(*(f.status for f in frames), strict=True))),
         frames[0].carriers,
+        jax.tree.map(lambda *parts: library.stack(parts), *(f.body for f in frames)),
     )

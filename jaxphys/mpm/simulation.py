@@ -11,17 +11,42 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jaxphys.core.errors import InputError, nearest
-from jaxphys.mpm.materials.catalogue import check_parameter
-from jaxphys.mpm.motion import Frame
+from jaxphys.mpm.boundaries import Setting
+from jaxphys.mpm.changes import (
+    Layout,
+    gravity_of,
+    is_traced,
+    parameter,
+    with_boundaries,
+    with_parameters,
+    with_start,
+)
+from jaxphys.mpm.loop.rigid_body import free_one, pose_of
+from jaxphys.mpm.materials.parameters import DENSITY
+from jaxphys.mpm.motion import BodyFrame, Frame
 from jaxphys.mpm.state import OK, Config, Model, State
+from jaxphys.mpm.stepping import Fixed, Stepping
 from jaxphys.mpm.stepping.fixed import choose_substep
+
+FIXED = Fixed()
+# What `Simulation.with_` takes beside the parameters of the materials.
+NAMES = {
+    "position",
+    "velocity",
+    "spin",
+    "affine",
+    "deformation",
+    "gravity",
+    "density",
+    "friction",
+    "boundaries",
+}
 
 
 @partial(
     jax.tree_util.register_dataclass,
     data_fields=("model", "state", "order", "carriers"),
-    meta_fields=("config", "counts", "dt", "steps", "given_substep"),
+    meta_fields=("config", "counts", "dt", "steps", "given_substep", "stepping"),
 )
 @dataclass(frozen=True)
 class Simulation:
@@ -35,9 +60,10 @@ class Simulation:
         carriers: which particle, in the object's order, carries each drawn point, int32 (K,).
         config: the solver's program.
         counts: particles of each object; objects follow one another in the object's order.
-        dt: time step [s].
-        steps: time steps a frame.
+        dt: time step [s], of fixed steps.
+        steps: fixed time steps a frame.
         given_substep: the largest step that was asked for [s], or None: as the bounds allow.
+        stepping: how a frame is stepped through: `Fixed()` or `Adaptive()`.
     """
 
     model: Model
@@ -49,6 +75,7 @@ class Simulation:
     dt: float
     steps: int
     given_substep: float | None = None
+    stepping: Stepping = FIXED
 
     @property
     def frame_time(self) -> float:
@@ -81,12 +108,24 @@ class Simulation:
             state.time,
             state.status,
             carriers,
+            self._body(state, sound),
         )
+
+    def _body(self, state: State, sound: Array) -> BodyFrame | None:
+        free = free_one(self.model.boundaries)
+        if free is None or state.rigid is None:
+            return None
+        place = pose_of(free, state.rigid)
+        return BodyFrame(place.centre * sound, place.orientation * sound)
 
     def with_(
         self,
         *,
+        position=None,
         velocity=None,
+        spin=None,
+        affine=None,
+        deformation=None,
         gravity=None,
         density=None,
         friction=None,
@@ -99,13 +138,20 @@ class Simulation:
         Traced ones cannot be: a step that they break shows in the status of the motion.
 
         Args:
+            position: at the start [m], (N, 3). Boundaries that act on chosen particles choose anew.
             velocity: at the start [m/s], (3,) for all particles or (N, 3); motion about a
                 particle's own middle (`State.affine`) is set to zero.
+            spin: at the start, of each object about its centre of mass [rad/s], (3,) for all
+                objects or (K, 3), on top of `velocity`, or of what the object moves as a whole.
+            affine: velocity gradients about particles' own middles at the start [1/s], (3, 3) or
+                (N, 3, 3), instead of those of `velocity` and `spin`.
+            deformation: gradients F at the start, with det F > 0, (3, 3) or (N, 3, 3).
             gravity: (3,) [m/s^2].
             density: [kg/m^3], a number or (N,).
             friction: Coulomb's coefficient of every boundary that has one.
             boundaries: other numbers of single boundaries, by their place in the scene's list, such
-                as `{0: {"point": (0.0, 0.0, 0.2)}}`.
+                as `{0: {"point": (0.0, 0.0, 0.2)}}`. Where these say which particles are meant,
+                they are chosen anew; a choice has no slope, so it adds nothing to a gradient.
             parameters: of the materials, such as `youngs_modulus`: a number or (N,).
 
         Arrays (N,) and (N, 3) are in the object's order: each object's Gaussians as they were
@@ -115,65 +161,26 @@ class Simulation:
             InputError: a name that nothing here has, a value out of range, or a wrong shape.
         """
         model, state = self.model, self.state
+        layout = Layout(self.order, self.objects, state.position.dtype)
         if density is not None:
-            model = replace(model, mass=model.volume * self._per_particle("density", density))
-        known = model.parameters
-        omitted = {name for law, _, _ in self.config.segments for name in law.omits}
-        for name, value in parameters.items():
-            if name in omitted - set(known):
-                raise InputError(
-                    f"with_: {name} was built as 0, which leaves it out of the program; build the "
-                    "scene with a positive one to change it"
-                )
-            if name not in known:
-                names = {*known, "velocity", "gravity", "density", "friction", "boundaries"}
-                raise InputError(f"with_: no material here has {name!r}; {nearest(name, names)}")
-            model = replace(
-                model, parameters=model.parameters | {name: self._per_particle(name, value)}
-            )
+            mass = model.volume * parameter(layout, DENSITY, density)
+            model = replace(model, mass=mass)
         if gravity is not None:
-            model = replace(model, gravity=_vector("gravity", gravity, model.mass.dtype))
-        if friction is not None:
-            model = replace(model, boundaries=_with_friction(model.boundaries, friction))
-        if boundaries is not None:
-            model = replace(model, boundaries=_with_numbers(model.boundaries, boundaries))
-        if velocity is not None:
-            state = state._replace(
-                velocity=self._velocities(velocity), affine=jnp.zeros_like(state.affine)
-            )
-        return replace(self, model=model, state=state)._with_step()
-
-    def _per_particle(self, name: str, value: Any) -> Array:
-        """A number or (N,) in the object's order as (N,) in the solver's."""
-        if not _is_traced(value):
-            check_parameter(name, value, "with_")
-        value = jnp.asarray(value, self.model.mass.dtype)
-        count = self.config.particles
-        if value.shape not in ((), (count,)):
-            raise InputError(f"with_: {name} has shape {value.shape}; give a number or ({count},)")
-        return jnp.broadcast_to(value, (count,)) if value.ndim == 0 else self._sorted(value)
-
-    def _sorted(self, value: Array) -> Array:
-        """(..., N) from the object's order into the solver's."""
-        return jnp.zeros_like(value).at[..., self.order].set(value, unique_indices=True)
-
-    def _velocities(self, velocity: Any) -> Array:
-        like = self.state.velocity
-        if not _is_traced(velocity) and not np.all(np.isfinite(np.asarray(velocity))):
-            raise InputError("with_: velocity has entries that are not finite")
-        velocity = jnp.asarray(velocity, like.dtype)
-        count = self.config.particles
-        if velocity.shape == (3,):
-            return jnp.broadcast_to(velocity[:, None], like.shape)
-        if velocity.shape != (count, 3):
-            raise InputError(
-                f"with_: velocity has shape {velocity.shape}; give (3,) or ({count}, 3)"
-            )
-        return self._sorted(velocity.T)
+            model = replace(model, gravity=gravity_of(layout, gravity))
+        model = with_parameters(self.config, model, layout, parameters, NAMES)
+        start = (position, velocity, spin, affine, deformation)
+        state = with_start(self.config, model, state, layout, *start)
+        setting = Setting(self.config.grid, state.position.T, model.volume, layout.dtype)
+        moved = position is not None
+        listed = with_boundaries(model.boundaries, setting, boundaries or {}, friction, moved)
+        free = free_one(listed)
+        if free is not None and (friction is not None or boundaries is not None):
+            state = state._replace(rigid=free.body(listed))
+        return replace(self, model=replace(model, boundaries=listed), state=state)._with_step()
 
     def _with_step(self) -> "Simulation":
         """With the time step that the numbers allow, where all of them are known."""
-        if any(_is_traced(leaf) for leaf in jax.tree.leaves((self.model, self.state))):
+        if any(is_traced(leaf) for leaf in jax.tree.leaves((self.model, self.state))):
             return self
         dt, steps, _ = choose_substep(
             self.config,
@@ -183,35 +190,3 @@ class Simulation:
             self.given_substep,
         )
         return replace(self, dt=dt, steps=steps)
-
-
-def _is_traced(value: Any) -> bool:
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value))
-
-
-def _vector(name: str, value: Any, dtype) -> Array:
-    if not _is_traced(value) and not np.all(np.isfinite(np.asarray(value))):
-        raise InputError(f"with_: {name} has entries that are not finite")
-    value = jnp.asarray(value, dtype)
-    if value.shape != (3,):
-        raise InputError(f"with_: {name} has shape {value.shape}; give (3,)")
-    return value
-
-
-def _with_numbers(boundaries: tuple, changes: Mapping[int, Mapping[str, Any]]) -> tuple:
-    made = list(boundaries)
-    for index, values in changes.items():
-        if index not in range(len(made)):
-            raise InputError(f"with_: boundaries[{index}]: there are {len(made)}, counted from 0")
-        try:
-            made[index] = made[index].changed(**values)
-        except InputError as error:
-            raise InputError(f"with_: boundaries[{index}].{error}") from None
-    return tuple(made)
-
-
-def _with_friction(boundaries: tuple, friction: Any) -> tuple:
-    rough = [i for i, b in enumerate(boundaries) if getattr(b, "friction", None) is not None]
-    if not rough:
-        raise InputError("with_: no boundary here has friction; build one with friction above 0")
-    return _with_numbers(boundaries, {i: {"friction": friction} for i in rough})

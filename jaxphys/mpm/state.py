@@ -12,9 +12,11 @@ from jaxphys.core.errors import InputError
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.placement import Placement
 from jaxphys.mpm.materials.law import Law
+from jaxphys.mpm.transfer.kernels import Kernel
+from jaxphys.mpm.transfer.schemes import Transfer
 from jaxphys.mpm.transfer.stencil import Window
 
-CODES = 8
+CODES = 10
 (
     OK,
     NOT_FINITE,
@@ -24,6 +26,8 @@ CODES = 8
     INVERTED,
     COLLAPSED,
     UNSTABLE_STEP,
+    TOO_MANY_STEPS,
+    NOT_CONVERGED,
 ) = range(CODES)
 
 
@@ -37,10 +41,13 @@ class Config:
         where a law is plastic; elsewhere the two are the same.
     window: nodes per axis of the part of the grid that is computed, or None for all of it. The
         window follows the particles; if they outgrow it, the status says so. A block of particles
-        that spans c cells needs c + 3 nodes, two more if it moves, and room for what its motion
-        adds.
+        that spans c cells needs c + 3 nodes, c + 4 with cubic splines, two more if it moves, and
+        room for what its motion adds.
     check_step: compare dt with what the state's stiffness allows, at the start of every rollout.
+    tells_rates: a pass tells how fast its particles move and deform (`Seen.rates`), for steps that
+        adapt.
     placement: in which chunks and on which devices particles are computed.
+    transfer: how particles and grid exchange velocities, and with which kernel.
     """
 
     grid: Grid
@@ -48,7 +55,9 @@ class Config:
     track_total: bool = False
     window: tuple[int, int, int] | None = None
     check_step: bool = True
+    tells_rates: bool = False
     placement: Placement = Placement()
+    transfer: Transfer = Transfer()
 
     def __post_init__(self):
         reached = 0
@@ -61,11 +70,17 @@ class Config:
             reached = stop
         if not reached:
             raise InputError("Config.segments is empty: give at least one (law, start, stop).")
+        width = self.kernel.width
+        if min(self.grid.shape) < width:
+            raise InputError(
+                f"Config.grid has shape {self.grid.shape}: {self.transfer.kernel} splines touch "
+                f"{width} nodes per axis; give at least as many."
+            )
         if self.window is not None and not all(
-            3 <= w <= n for w, n in zip(self.window, self.grid.shape, strict=True)
+            width <= w <= n for w, n in zip(self.window, self.grid.shape, strict=True)
         ):
             raise InputError(
-                f"Config.window is {self.window}: it must lie between 3 nodes and the grid's "
+                f"Config.window is {self.window}: it must lie between {width} nodes and the grid's "
                 f"{self.grid.shape} on each axis."
             )
 
@@ -73,6 +88,11 @@ class Config:
     def particles(self) -> int:
         """Number of particles."""
         return self.segments[-1][2]
+
+    @property
+    def kernel(self) -> Kernel:
+        """That of the transfers."""
+        return self.transfer.spline
 
     @property
     def nodes(self) -> tuple[int, int, int]:
@@ -92,7 +112,7 @@ class Config:
     @property
     def computed(self) -> Window:
         """The part of the grid that is computed, for transfers."""
-        return Window(self.nodes, self.grid.spacing, self.grid.shape)
+        return Window(self.nodes, self.grid.spacing, self.grid.shape, self.kernel)
 
     @property
     def history_rows(self) -> int:
@@ -112,7 +132,8 @@ class Model:
 
     mass: (N,) [kg]; volume: (N,) rest volume [m^3]; parameters: name -> (N,), as the laws name
     them; gravity: (3,) [m/s^2], or None for none, which no step then adds; boundaries: as
-    `boundaries.prepare` makes them.
+    `boundaries.prepare` makes them; wave_modulus: (N,) of waves at rest [Pa], which a rollout works
+    out for its boundaries (`stepping.bounds.with_wave_modulus`).
     """
 
     mass: Array
@@ -120,15 +141,17 @@ class Model:
     parameters: dict[str, Array]
     gravity: Array | None
     boundaries: tuple = ()
+    wave_modulus: Array | None = None
 
 
 class Status(NamedTuple):
     """Whether a simulation is sound, and if not, what failed first. All scalars, int32.
 
     code: OK, or one of NOT_FINITE, LEFT_GRID, STEP_TOO_LARGE, LEFT_WINDOW, INVERTED, COLLAPSED,
-    UNSTABLE_STEP, which `loop.status.check` explains; step: steps taken before the one that failed;
-    particle: the lowest index that failed in it (UNSTABLE_STEP: the one that allows least); taken:
-    steps taken in all. `step` and `particle` are -1 while code is OK.
+    UNSTABLE_STEP, TOO_MANY_STEPS, NOT_CONVERGED, which `loop.status.check` explains; step: steps
+    taken before the one that failed; particle: the lowest index that failed in it (UNSTABLE_STEP,
+    TOO_MANY_STEPS: the one that allows least; NOT_CONVERGED: -1, for it is the step that failed);
+    taken: steps taken in all. `step` and `particle` are -1 while code is OK.
     """
 
     code: Array
@@ -151,6 +174,24 @@ class Residual(NamedTuple):
     time: Array | None
 
 
+class RigidBody(NamedTuple):
+    """A rigid body that particles push.
+
+    position: of its centre of mass [m], (3,); orientation: quaternion from its own axes to the
+    world's, (4,); momentum: [kg m/s], (3,); angular_momentum: about its centre of mass
+    [kg m^2/s], (3,); rest: what rounding left out of position and orientation, or None in float64;
+    slip: how far its points are strained along surfaces with friction [m], three rows a surface,
+    (R, P), or None if there are none.
+    """
+
+    position: Array
+    orientation: Array
+    momentum: Array
+    angular_momentum: Array
+    rest: tuple[Array, Array] | None
+    slip: Array | None
+
+
 class State(NamedTuple):
     """What a step changes. Particle axis last.
 
@@ -159,7 +200,7 @@ class State(NamedTuple):
     None where it is the same or not asked for; history: (H, N) or None if no law keeps any;
     time: () [s]; status: `Status`; residual: `Residual`, or None in float64, where sums have digits
     to spare; slip: (R, N) [m], how far contact is strained along surfaces with friction, three rows
-    each, or None if there are none.
+    each, or None if there are none; rigid: the `RigidBody`, or None if no boundary is free.
     """
 
     position: Array
@@ -172,6 +213,7 @@ class State(NamedTuple):
     status: Status
     residual: Residual | None = None
     slip: Array | None = None
+    rigid: RigidBody | None = None
 
 
 def initial_state(
@@ -211,7 +253,7 @@ def initial_state(
         return jnp.zeros((*shape, count), dtype)
 
     if deformation is not None:
-        _refuse_inverted(deformation)
+        refuse_inverted(deformation, "initial_state")
     else:
         deformation = jnp.broadcast_to(jnp.eye(3, dtype=dtype), (count, 3, 3))
     history = None
@@ -249,17 +291,20 @@ def initial_state(
         ),
         residual=residual,
         slip=zeros(rows) if rows else None,
+        rigid=next((b.body(boundaries) for b in boundaries if b.free), None),
     )
 
 
-def _refuse_inverted(deformation) -> None:
-    """Raises `InputError` if some det F of concrete gradients (N, 3, 3) is not positive."""
+def refuse_inverted(deformation, where: str) -> None:
+    """Raises `InputError` if some det F of concrete gradients (N, 3, 3) is not positive; where: for
+    its message.
+    """
     if isinstance(deformation, jax.core.Tracer) or np.shape(deformation)[1:] != (3, 3):
         return
     volume = np.linalg.det(np.asarray(deformation, np.float64))
     wrong = np.flatnonzero(volume <= 0)
     if wrong.size:
         raise InputError(
-            f"initial_state: deformation[{wrong[0]}] has determinant {volume[wrong[0]]:.3g}: no "
+            f"{where}: deformation[{wrong[0]}] has determinant {volume[wrong[0]]:.3g}: no "
             "motion leads there; give gradients with det F > 0."
         )

@@ -11,6 +11,7 @@ from jaxphys.core.files import aside_path
 from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.core.run_folder import RunFolder, run_folder
 from jaxphys.gaussians.gaussians import Gaussians
+from jaxphys.gaussians.mesh import write_triangles
 from jaxphys.gaussians.ply import write_ply
 from jaxphys.mpm.loop.status import SimulationError
 from jaxphys.pipeline.draw import deformed_gaussians
@@ -22,6 +23,13 @@ from jaxphys.pipeline.video import write_picture
 from jaxphys.scene.build import build, validate
 from jaxphys.scene.json import to_json, write_scene
 from jaxphys.scene.look import Look
+from jaxphys.scene.obstacles import (
+    located,
+    mesh_file,
+    mesh_obstacles,
+    triangles_of,
+    with_sources,
+)
 from jaxphys.scene.scene import Scene
 from jaxphys.scene.source import find, load_object
 
@@ -69,8 +77,9 @@ def animate(
         before.
         KeyboardInterrupt: what is done is saved.
     """
-    timing = timing or Timing()
+    timing, scene = timing or Timing(), scene.filmed()
     validate(scene)
+    scene = located(scene, beside)
     with timing.stage("load"):
         if objects is None:
             objects = tuple(
@@ -78,8 +87,11 @@ def animate(
                 for i, thing in enumerate(scene.objects)
             )
             inputs = (*inputs, *source_files(scene, beside))
+    meshes = [mesh_file(scene, i) for i in mesh_obstacles(scene)]
+    inputs = (*inputs, *meshes)
     written = _with_written_sources(scene)
-    identity = fingerprint(b"animate", _text(written), objects)
+    shapes = [path.read_bytes() for path in meshes]
+    identity = fingerprint(b"animate", _text(written), objects, *shapes)
     names = products(scene, save_splats)
     with run_folder(out, identity, names, inputs=inputs, overwrite=overwrite) as folder:
         return animate_in(
@@ -96,7 +108,8 @@ def animate(
 def products(scene: Scene, save_splats: bool) -> list[str]:
     """The names of all files that moving a scene may make."""
     splats = range(scene.frames if save_splats else 0)
-    return [*MADE, *UNFINISHED, *_object_names(scene), *map(_splats_name, splats)]
+    obstacles = _obstacle_names(scene).values()
+    return [*MADE, *UNFINISHED, *_object_names(scene), *obstacles, *map(_splats_name, splats)]
 
 
 def source_files(scene: Scene, beside: Path | None) -> list[Path]:
@@ -175,12 +188,17 @@ def _object_names(scene: Scene) -> list[str]:
     return ["gaussians.ply", *(f"gaussians_{i}.ply" for i in range(1, len(scene.objects)))]
 
 
+def _obstacle_names(scene: Scene) -> dict[int, str]:
+    return {i: f"obstacle_{i}.ply" for i in mesh_obstacles(scene)}
+
+
 def _splats_name(frame: int) -> str:
     return f"splats/{frame:04d}.ply"
 
 
 def _with_written_sources(scene: Scene) -> Scene:
-    """The scene with its objects read from where the run writes them."""
+    """The scene with its objects and obstacles read from where the run writes them."""
+    scene = with_sources(scene, _obstacle_names(scene))
     things = tuple(
         dataclasses.replace(thing, source=name)
         for thing, name in zip(scene.objects, _object_names(scene), strict=True)
@@ -189,7 +207,9 @@ def _with_written_sources(scene: Scene) -> Scene:
 
 
 def _write_inputs(folder: RunFolder, scene: Scene, objects: tuple[Gaussians, ...]) -> Scene:
-    """Writes the Gaussians and the config that names them."""
+    """Writes the Gaussians, the obstacles' meshes and the config that names them."""
+    for i, name in _obstacle_names(scene).items():
+        write_triangles(folder.file(name), triangles_of(scene, i))
     for name, gaussians in zip(_object_names(scene), objects, strict=True):
         write_ply(folder.file(name), gaussians)
     scene = _with_written_sources(scene)
@@ -211,4 +231,4 @@ def _save_last_good(
         return
     write_ply(folder.file("last_good.ply"), deformed_gaussians(look, record.frames[last]))
     artist = Artist(scene, look, record.frames, timing)
-    write_picture(folder.file("last_good.png"), artist.paint(last, record.frames[last]))
+    write_picture(folder.file("last_good.png"), artist.paint(last, record.frames[last:])[0])

@@ -7,9 +7,10 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.core.program import part
+from jaxphys.core.rotations import quaternion_to_matrix
 from jaxphys.core.splats import Splats
 from jaxphys.gaussians.colour import regularise
-from jaxphys.gaussians.gaussians import Gaussians, concatenate, to_splats
+from jaxphys.gaussians.gaussians import Gaussians, concatenate, to_splats, transform
 from jaxphys.mpm.motion import Frame
 from jaxphys.mpm.state import OK
 from jaxphys.pipeline.deform import bake, deform
@@ -46,7 +47,24 @@ def frame_splats(look: Look, frame: Frame, eye: Array) -> Splats:
         with part("still Gaussians"):
             rest = to_splats(look.still, eye)
             splats = jax.tree.map(lambda *both: jnp.concatenate(both), splats, rest)
+    if look.solids:
+        with part("obstacles"):
+            rest = [to_splats(one, eye) for one in _solids(look, frame)]
+            splats = jax.tree.map(lambda *all: jnp.concatenate(all), splats, *rest)
     return splats
+
+
+def _solids(look: Look, frame: Frame) -> list[Gaussians]:
+    """The obstacles that are drawn, where they are at the time of a frame."""
+    placed = []
+    for gaussians, obstacle in look.solids:
+        if obstacle.free and frame.body is not None:
+            centre, orientation = frame.body
+        else:
+            centre, orientation, *_ = obstacle.pose(frame.time)
+        turn = quaternion_to_matrix(orientation)
+        placed.append(transform(gaussians, rotation=turn, translation=centre))
+    return placed
 
 
 def draw(
@@ -82,4 +100,6 @@ def deformed_gaussians(look: Look, frame: Frame) -> Gaussians:
     """One frame as Gaussians that can be written to a file. Raises as `frame_splats` does."""
     frame.check()
     moved = bake(look.gaussians, *frame.carried())
-    return moved if look.still is None else concatenate([moved, look.still])
+    still = [] if look.still is None else [look.still]
+    rest = [*still, *_solids(look, frame)]
+    return concatenate([moved, *rest]) if rest else moved

@@ -1,9 +1,11 @@
 """Frames of a motion as pictures, and as a video."""
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +13,7 @@ import numpy as np
 from jax import Array
 from tqdm import tqdm
 
+from jaxphys.core.ensemble import over_devices
 from jaxphys.core.program import part
 from jaxphys.mpm.motion import Frame
 from jaxphys.pipeline.backdrop import backdrop
@@ -24,6 +27,18 @@ from jaxphys.scene.look import Look
 from jaxphys.scene.scene import Scene
 
 ROOM = 1.15  # capacity over what the frames looked at need
+# Pictures drawn at once, at most: each needs lists and pixels of its own, some 150 MB where it is
+# of two megapixels, and the first one waits for the last frame.
+MOST_AT_ONCE = 8
+
+
+def drawn_at_once(frames: int) -> int:
+    """How many of so many frames are drawn at once, each on a device of its own.
+
+    A picture by itself keeps several cores busy in parts only, in loops of small steps; pictures
+    side by side have nothing to wait for, whatever their size.
+    """
+    return max(1, min(frames, jax.device_count(), MOST_AT_ONCE))
 
 
 @dataclass(frozen=True)
@@ -82,6 +97,30 @@ def picture(
     return jnp.round(255 * jnp.clip(image.colour, 0, 1)).astype(jnp.uint8), image.required
 
 
+@partial(jax.jit, static_argnames=("surroundings", "capacity", "devices"))
+def pictures(
+    look: Look,
+    frames: Frame,
+    cameras: Camera,
+    middle: Array,
+    extent: Array,
+    *,
+    surroundings: Surroundings,
+    capacity: int,
+    devices: int,
+) -> tuple[Array, Array]:
+    """As `picture` of each of some frames, stacked as their cameras are, over so many devices:
+    bytes (T, H, W, 3) uint8 and numbers of pairs (T,).
+    """
+
+    def one(frame: Frame, camera: Camera) -> tuple[Array, Array]:
+        return picture(
+            look, frame, camera, middle, extent, surroundings=surroundings, capacity=capacity
+        )
+
+    return over_devices(one, devices, in_turn=True)(frames, cameras)
+
+
 @jax.jit
 def _needed(look: Look, frame: Frame, camera: Camera) -> Array:
     """Pairs of tile and splat of one frame."""
@@ -89,7 +128,8 @@ def _needed(look: Look, frame: Frame, camera: Camera) -> Array:
 
 
 class Artist:
-    """Draws frames of one scene; compiles once, and again only where a frame needs more room.
+    """Draws frames of one scene, several at once where there are several devices; compiles once,
+    and again only where a frame needs more room.
 
     Args:
         scene: size of the pictures, camera and surroundings.
@@ -97,10 +137,15 @@ class Artist:
         frames: those that the camera must show and that room is made for: all of them, or where the
             camera stands by itself (`View.stands_by_itself`) the first one.
         timing: gets the seconds of compiling.
+
+    Attributes:
+        cameras: of all frames.
+        at_once: how many frames are drawn together, see `drawn_at_once`.
     """
 
     def __init__(self, scene: Scene, look: Look, frames: list[Frame], timing: Timing):
         self._look, self._timing = look, timing
+        self.at_once = drawn_at_once(scene.frames)
         self._surroundings = surroundings_of(scene)
         shown = [np.asarray(frame.carried()[0]) for frame in frames]
         low, high = shown[0].min(axis=0), shown[0].max(axis=0)
@@ -119,29 +164,49 @@ class Artist:
             needed = [int(_needed(look, frames[i], self.cameras[i])) for i in {0, last // 2, last}]
         self._capacity = next_capacity(int(ROOM * max(needed)))
 
-    def _run(self, frame: Frame, camera: Camera) -> tuple[Array, Array]:
-        arguments = (self._look, frame, camera, self._middle, self._extent)
+    def _run(self, frames: Frame, cameras: Camera) -> tuple[Array, Array]:
+        arguments = (self._look, frames, cameras, self._middle, self._extent)
         program = self._programs.get(self._capacity)
         if program is None:
             with self._timing.compiling("render"):
-                program = picture.lower(
-                    *arguments, surroundings=self._surroundings, capacity=self._capacity
+                program = pictures.lower(
+                    *arguments,
+                    surroundings=self._surroundings,
+                    capacity=self._capacity,
+                    devices=self.at_once,
                 ).compile()
             self._programs[self._capacity] = program
         return program(*arguments)
 
-    def paint(self, index: int, frame: Frame) -> np.ndarray:
-        """Frame `index` as (H, W, 3) uint8.
+    def paint(self, first: int, frames: list[Frame]) -> list[np.ndarray]:
+        """Frames `first` and after, at most `at_once` of them, as (H, W, 3) uint8 each.
 
         Raises:
             SimulationError: the simulation had failed by then.
         """
-        frame.check(index)
+        for index, frame in enumerate(frames, first):
+            frame.check(index)
+        # One program for any number: where frames are missing the last one is drawn again.
+        places = [min(i, len(frames) - 1) for i in range(self.at_once)]
+        together = _stacked([frames[i] for i in places])
+        cameras = _stacked([self.cameras[first + i] for i in places])
         while True:
-            pixels, required = self._run(frame, self.cameras[index])
-            if int(required) <= self._capacity:
-                return np.asarray(pixels)
-            self._capacity = next_capacity(int(required))
+            pixels, required = self._run(together, cameras)
+            needed = int(np.max(required))
+            if needed <= self._capacity:
+                return list(np.asarray(pixels)[: len(frames)])
+            self._capacity = next_capacity(needed)
+
+
+def _stacked(trees: list) -> Any:
+    return jax.tree.map(lambda *leaves: np.stack(leaves), *trees)
+
+
+def _groups(frames: Iterable[Frame], size: int) -> Iterator[list[Frame]]:
+    """So many frames at a time, fewer at the end."""
+    rest = iter(frames)
+    while group := list(islice(rest, size)):
+        yield group
 
 
 def film(
@@ -164,7 +229,7 @@ def film(
         scene: what surrounds the object, and the camera.
         look: what is drawn.
         frames: of the scene, all of them, one after the other.
-        interrupted: whether to stop after the present picture.
+        interrupted: whether to stop after the present pictures.
         timing: gets the seconds.
         progress: whether to show a bar with the time left.
         watch: called with the number of each picture; may raise KeyboardInterrupt.
@@ -174,20 +239,23 @@ def film(
     """
     if not scene.camera.stands_by_itself:
         frames = list(frames)
-    sheet, artist = ContactSheet(scene.frames), None
+    sheet, artist, index = ContactSheet(scene.frames), None, 0
     bar = tqdm(total=scene.frames, desc="render", unit="frame", disable=not progress)
     with bar, VideoWriter(path, scene.width, scene.height, scene.fps) as writer:
-        for index, frame in enumerate(frames):
+        for group in _groups(frames, drawn_at_once(scene.frames)):
             with timing.stage("render"):
                 if artist is None:
-                    known = frames if isinstance(frames, list) else [frame]
+                    known = frames if isinstance(frames, list) else group
                     artist = Artist(scene, look, known, timing)
-                pixels = artist.paint(index, frame)
-                writer.add(pixels)
-                sheet.add(index, pixels)
-            bar.update()
-            if watch:
-                watch(index)
+                drawn = artist.paint(index, group)
+            for pixels in drawn:
+                with timing.stage("render"):
+                    writer.add(pixels)
+                    sheet.add(index, pixels)
+                bar.update()
+                if watch:
+                    watch(index)
+                index += 1
             if interrupted():
                 raise KeyboardInterrupt
     return sheet

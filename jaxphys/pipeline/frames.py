@@ -14,13 +14,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jaxphys.mpm.loop.frames import advance_frame
+from jaxphys.mpm.loop.frames import next_frame
 from jaxphys.mpm.loop.status import check
 from jaxphys.mpm.loop.window import windowed
 from jaxphys.mpm.materials.fracture import number_of_pieces
 from jaxphys.mpm.motion import Frame, Motion, join
 from jaxphys.mpm.simulation import Simulation
-from jaxphys.mpm.state import LEFT_WINDOW, OK, State
+from jaxphys.mpm.state import LEFT_WINDOW, OK, Config, State
 from jaxphys.pipeline.output import Timing
 
 # How often a frame that fails is tried again with half the time step.
@@ -88,9 +88,10 @@ def frames(
 ) -> Iterator[Moment]:
     """Frame after frame without end; take as many as are wanted.
 
-    A frame that fails is tried again from its start with half the time step, five times at most,
-    unless the time step was asked for. The frames before it stay as they are, and the next one
-    begins with the simulation's own step again: what a frame is depends on its start alone.
+    A frame that fails is tried again from its start with half the time step, or half of what an
+    adaptive step takes of its bounds, five times at most, unless the time step was asked for. The
+    frames before it stay as they are, and the next one begins with the simulation's own step again:
+    what a frame is depends on its start alone.
 
     Args:
         simulation: from `scene.build`.
@@ -107,19 +108,16 @@ def frames(
         check(simulation.state.status, 0)
         yield _moment(simulation, simulation.state, 0, particles)
     number, state = start
-    dtype = state.position.dtype
     config, model = simulation.config, simulation.model
     if config.placement.devices > 1:
         # Where the frames leave it, so that the first one is no program of its own.
         model, state = jax.device_put((model, state), config.placement.everywhere())
 
-    def arguments(refinement: int):
-        steps = simulation.steps * 2**refinement
-        return jnp.asarray(simulation.frame_time / steps, dtype), jnp.asarray(steps, jnp.int32)
+    def advance(config: Config, state: State, refinement: int | None) -> State:
+        return next_frame(simulation, config, model, state, refinement)
 
     with timing.stage("simulate"), timing.compiling("simulate"):
-        dt, steps = arguments(0)
-        jax.block_until_ready(advance_frame(windowed(config, state), model, state, dt, 0 * steps))
+        jax.block_until_ready(advance(windowed(config, state), state, None))
     refinements = 0 if simulation.given_substep is not None else REFINEMENTS
     while True:
         number += 1
@@ -127,11 +125,10 @@ def frames(
             before = state
             program = windowed(config, before)
             for refinement in range(refinements + 1):
-                dt, steps = arguments(refinement)
-                state = advance_frame(program, model, before, dt, steps)
+                state = advance(program, before, refinement)
                 if int(state.status.code) == LEFT_WINDOW:
                     program = replace(config, window=None)
-                    state = advance_frame(program, model, before, dt, steps)
+                    state = advance(program, before, refinement)
                 if int(state.status.code) == OK:
                     break
             check(state.status, number)

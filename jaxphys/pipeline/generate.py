@@ -79,7 +79,7 @@ def generate(
     from jaxphys.guidance import choice, library
 
     timing = Timing()
-    scene, generation = _asked(prompt, scene, changes)
+    scene, generation = _asked(prompt, scene.filmed(), changes)
     validate(scene)
     choice.require(generation.prior, generation.shape_prior, dtype=generation.precision)
     if generation.prior == choice.LIBRARY:

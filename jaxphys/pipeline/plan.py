@@ -21,10 +21,12 @@ from jaxphys.mpm.loop.chunks import cuts
 from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.loop.window import windowed
 from jaxphys.mpm.materials.catalogue import MATERIALS
+from jaxphys.mpm.stepping import Adaptive
 from jaxphys.mpm.stepping.bounds import largest_stable_dt
-from jaxphys.pipeline.film import picture, surroundings_of
+from jaxphys.pipeline.film import drawn_at_once, picture, surroundings_of
 from jaxphys.render.camera import orbit
 from jaxphys.scene.build import Built, build
+from jaxphys.scene.obstacles import located
 from jaxphys.scene.place import rotation_matrix
 from jaxphys.scene.scene import Object, Scene
 from jaxphys.scene.source import load_object
@@ -47,6 +49,7 @@ OPTIONAL: Mapping[str, tuple[str, str]] = MappingProxyType(
             "neither laws nor colours need it",
         ),
         "return map": ("a law is plastic", "no law is plastic"),
+        "viscosity": ("a fluid has it", "no fluid has any"),
         "history": ("a law remembers", "no law remembers"),
         "second deformation gradient": (
             "plastic flow must be seen in the splats",
@@ -55,6 +58,10 @@ OPTIONAL: Mapping[str, tuple[str, str]] = MappingProxyType(
         "compensated sums": (
             "float32 would round small steps away",
             "float64 has digits to spare",
+        ),
+        "velocity of its own": (
+            "the transfer lets particles keep one",
+            "particles move as the grid does",
         ),
         "contact": (
             "a boundary pushes particles at their distance",
@@ -67,6 +74,11 @@ OPTIONAL: Mapping[str, tuple[str, str]] = MappingProxyType(
         ),
         "colour regularisation": ("the scene asks for it", "switched off"),
         "drawn floor": ("the scene asks for it", "the scene asks for none"),
+        "obstacles": (
+            "the scene has some that keep matter out",
+            "the scene has none, or hides them",
+        ),
+        "rigid body": ("an obstacle is free", "no obstacle is free"),
         "still Gaussians": ("some are drawn that do not move", "all of them move"),
     }
 )
@@ -82,8 +94,11 @@ class Plan:
         particles, gaussians, grid: sizes; window: of the grid, the part that the first frame
             computes.
         devices: how many share the particles; chunk: particles computed together, at most.
-        substep: time step [s]; `bounds` [s] and `reason`: what limits it.
-        steps_per_frame, frames, steps: counts.
+        pictures: frames drawn at once, each on a device of its own.
+        stepping: how a frame is stepped through.
+        substep: time step [s], of fixed steps; `bounds` [s] and `reason`: what limits it.
+        steps_per_frame, frames, steps: counts, of fixed steps; those that adapt are not known
+            before they are taken.
         memory: bytes by what they hold.
         seconds: estimate by stage, on two CPU cores.
     """
@@ -96,6 +111,8 @@ class Plan:
     window: tuple[int, int, int]
     devices: int
     chunk: int
+    pictures: int
+    stepping: str
     substep: float
     bounds: dict[str, float]
     reason: str
@@ -156,6 +173,7 @@ def make_plan(scene: Scene, beside: Path | None = None) -> Plan:
         else load_object(thing, beside, scene.seed + i, f"objects[{i}]")
         for i, thing in enumerate(scene.objects)
     )
+    scene = located(scene, beside)
     return describe(scene, build(scene, *objects))
 
 
@@ -198,12 +216,14 @@ def describe(scene: Scene, built: Built) -> Plan:
     included, left_out = _facts(scene, built)
     bounds = largest_stable_dt(simulation.config, simulation.model, simulation.state)
     reason = bounds.reason if scene.substep is None else "the scene's own substep"
-    placement = simulation.config.placement
+    placement, transfer = simulation.config.placement, simulation.config.transfer
+    row, stencil = 4 * transfer.columns, transfer.spline.width**3
     chunk = max(into.size for into in cuts(simulation.config.runs, placement))
     particles, drawn = simulation.config.particles, look.gaussians.count
     nodes = int(np.prod(simulation.config.grid.shape))
     steps = simulation.steps * (scene.frames - 1)
-    limits = {name: float(getattr(bounds, name)) for name in bounds._fields if name != "reason"}
+    # What the scene has nothing of sets no bound.
+    limits = {k: float(v) for k, v in bounds._asdict().items() if np.isfinite(v)}
     pixels = scene.width * scene.height
     state = sum(leaf.nbytes for leaf in jax.tree.leaves(simulation.state))
     model = sum(leaf.nbytes for leaf in jax.tree.leaves(simulation.model))
@@ -216,6 +236,8 @@ def describe(scene: Scene, built: Built) -> Plan:
         window=windowed(simulation.config, simulation.state).nodes,
         devices=placement.devices,
         chunk=chunk,
+        pictures=drawn_at_once(scene.frames),
+        stepping=_stepping_text(scene),
         substep=simulation.dt,
         bounds=limits,
         reason=reason,
@@ -224,10 +246,10 @@ def describe(scene: Scene, built: Built) -> Plan:
         steps=steps,
         memory={
             "state and parameters": state + model,
-            "grid": 16 * nodes,
-            "transfers": 27 * 16 * placement.devices * chunk,
+            "grid": row * nodes,
+            "transfers": stencil * row * placement.devices * chunk,
             "motion": 48 * drawn * scene.frames,
-            "picture": 32 * pixels,
+            "pictures": 32 * pixels * drawn_at_once(scene.frames),
         },
         seconds={
             "compile": COMPILE_SECONDS,
@@ -235,6 +257,17 @@ def describe(scene: Scene, built: Built) -> Plan:
             "render": scene.frames * (pixels / PIXELS_A_SECOND + drawn / SPLATS_A_SECOND),
         },
     )
+
+
+def _stepping_text(scene: Scene) -> str:
+    """How a film of this scene is stepped through."""
+    stepping = scene.filmed().stepping
+    if isinstance(stepping, Adaptive):
+        return (
+            f"adaptive, the bounds looked at again every {stepping.every} steps; "
+            "equal ones would be"
+        )
+    return "fixed"
 
 
 def as_text(plan: Plan, as_json: bool = False) -> str:
@@ -247,9 +280,13 @@ def as_text(plan: Plan, as_json: bool = False) -> str:
     lines += [f"  {name}: {why}" for name, why in plan.left_out.items()]
     grid, window = (" x ".join(map(str, shape)) for shape in (plan.grid, plan.window))
     part = "" if plan.window == plan.grid else f", of which {window} at a time"
+    at_once = "frames drawn one by one"
+    if plan.pictures > 1:
+        at_once = f"{plan.pictures} frames drawn at once, one on each"
     lines += [
         f"particles: {plan.particles} ({plan.gaussians} carry Gaussians), grid {grid}{part}",
-        f"devices: {plan.devices}, particles in chunks of {plan.chunk}",
+        f"devices: {plan.devices}, particles in chunks of {plan.chunk}, {at_once}",
+        f"stepping: {plan.stepping}",
         f"time step: {plan.substep:.3e} s, limited by {plan.reason}",
         *(f"  bound {name}: {value:.3e} s" for name, value in plan.bounds.items()),
         f"steps: {plan.steps_per_frame} a frame, {plan.frames} frames, {plan.steps} in all",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from jaxphys.core.checkpoints import Checkpoints, by_name, from_names
-from jaxphys.mpm.motion import Frame, Motion, join
+from jaxphys.mpm.motion import BodyFrame, Frame, Motion, join
 from jaxphys.mpm.state import State, Status
 
 FOLDER = "checkpoint/"
@@ -82,4 +82,7 @@ def _motion(piece: dict[str, np.ndarray]) -> Motion:
     arrays: Mapping[str, Any] = piece  # of numpy, as everything in files
     status = Status(*(arrays[f"status/{name}"] for name in Status._fields))
     position, deformation, time = (arrays[name] for name in ("position", "deformation", "time"))
-    return Motion(position, deformation, time, status, arrays["carriers"])
+    names = {name: f"body/{name}" for name in BodyFrame._fields}
+    there = names["centre"] in arrays
+    body = BodyFrame(**{k: arrays[name] for k, name in names.items()}) if there else None
+    return Motion(position, deformation, time, status, arrays["carriers"], body)

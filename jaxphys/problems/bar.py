@@ -14,7 +14,15 @@ import numpy as np
 from jax import Array
 
 from jaxphys.mpm.materials.elasticity import HENCKY
-from jaxphys.problems.discrete import Discretisation, Room, discretise, held_up_to, steps_for
+from jaxphys.mpm.transfer import Transfer
+from jaxphys.problems.discrete import (
+    DEFAULT,
+    Discretisation,
+    Room,
+    discretise,
+    held_up_to,
+    steps_for,
+)
 from jaxphys.problems.problem import Problem
 
 
@@ -70,9 +78,12 @@ class Bar:
 LEVELS = (8, 16, 32)
 
 
-def line_room(cells: int, per_axis: int = 2) -> Room:
-    """Room for a line of `cells` cells, three of margin at both ends, and 3 x 3 nodes across."""
-    return Room(cells * per_axis, (cells + 7, 3, 3))
+def line_room(cells: int, per_axis: int = 2, transfer: Transfer = DEFAULT) -> Room:
+    """Room for a line of `cells` cells, three of margin at both ends, and as many nodes across as
+    the kernel reaches, 3 x 3 or 4 x 4.
+    """
+    width = transfer.spline.width
+    return Room(cells * per_axis, (cells + 7, width, width))
 
 
 def line_points(lower: float, cells: int, spacing: float, per_axis: int = 2) -> np.ndarray:
@@ -89,6 +100,7 @@ def free_bar(
     periods: float = 1.0,
     staggered: bool = True,
     room: Room | None = None,
+    transfer: Transfer = DEFAULT,
     dtype=jnp.float64,
 ) -> Discretisation:
     """The bar and its mirror image, free at both ends: no boundary condition is imposed.
@@ -97,7 +109,7 @@ def free_bar(
     line of nodes: the sums over the other two axes are exact, so that the problem is the
     one-dimensional one.
     """
-    return _line(bar, cells, cells, courant, periods, staggered, -1e5, room, dtype)
+    return _line(bar, cells, cells, courant, periods, staggered, -1e5, room, transfer, dtype)
 
 
 def held_bar(
@@ -113,11 +125,14 @@ def held_bar(
     A quadratic B-spline field with these nodes at rest does not vanish at the end itself but in the
     mean half a cell away, so that the bar is longer by O(dx): first order.
     """
-    return _line(bar, cells, 0, courant, periods, True, 3.0, room, dtype)
+    return _line(bar, cells, 0, courant, periods, True, 3.0, room, DEFAULT, dtype)
 
 
-def _line(bar, cells, mirrored, courant, periods, staggered, held, room, dtype) -> Discretisation:
-    spacing = bar.length / cells
+def _line(
+    bar, cells, mirrored, courant, periods, staggered, held, room, transfer, dtype
+) -> Discretisation:
+    spacing, width = bar.length / cells, transfer.spline.width
+    middle = (width - 1) / 2  # of the nodes across
     dt, steps = steps_for(periods * bar.period, courant, spacing, bar.wave_speed)
     return discretise(
         bar,
@@ -125,8 +140,8 @@ def _line(bar, cells, mirrored, courant, periods, staggered, held, room, dtype) 
         spacing**3 / 2,
         law=HENCKY,
         poisson=0.0,
-        nodes=(cells + mirrored + 7, 3, 3),
-        origin=(mirrored + 3, 1, 1),
+        nodes=(cells + mirrored + 7, width, width),
+        origin=(mirrored + 3, middle, middle),
         spacing=spacing,
         dt=dt,
         steps=steps,
@@ -134,6 +149,7 @@ def _line(bar, cells, mirrored, courant, periods, staggered, held, room, dtype) 
         staggered=staggered,
         boundaries=(held_up_to(held, dtype),),
         room=room,
+        transfer=transfer,
         dtype=dtype,
     )
 

@@ -17,12 +17,16 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core import algebra
+from jaxphys.core.errors import InputError
 from jaxphys.mpm.boundaries import Boundary, Plane, Setting
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.state import Config, Model, State, initial_state
+from jaxphys.mpm.transfer import Transfer
 from jaxphys.problems.kinematics import deformation_gradient, velocity
+
+DEFAULT = Transfer()
 
 
 class Room(NamedTuple):
@@ -142,13 +146,14 @@ def discretise(
     boundaries: tuple = (),
     staggered: bool = True,
     room: Room | None = None,
+    transfer: Transfer = DEFAULT,
     dtype=jnp.float64,
 ) -> Discretisation:
     """Particles at `points` (N, 3) [m] with rest `volume` (N,) or () [m^3] that start on a motion.
 
     Args:
         truth: a pytree with `motion`, `youngs` [Pa] and `density` [kg/m^3].
-        nodes: of the grid; `room` may give more.
+        nodes: of the grid; `room` may give more; transfer: see `Config`.
         origin: (3,) where the motion's origin sits on the grid [dx].
         spacing: dx [m]; scale: see `Discretisation`; gravity: [m/s^2].
         boundaries: in units of dx.
@@ -169,7 +174,7 @@ def discretise(
     affine = jnp.where(real[:, None, None], affine, 0.0)
     full = lambda value: jnp.full((room.particles,), value, dtype)  # noqa: E731
     volume = jnp.asarray(rest_volume, dtype)
-    config = Config(Grid(room.nodes, 1.0), ((law, 0, room.particles),))
+    config = Config(Grid(room.nodes, 1.0), ((law, 0, room.particles),), transfer=transfer)
     model = Model(
         mass=volume * truth.density,
         volume=volume,
@@ -229,13 +234,19 @@ def volume_gain(problem: Discretisation, state: State) -> float:
 
 
 def energy(problem: Discretisation, state: State) -> float:
-    """Kinetic energy (with that of the affine parts, m D |C|^2 / 2) and stored energy.
+    """Kinetic energy (with that of the affine parts, m D |C|^2 / 2, where particles give them to
+    the grid) and stored energy.
 
     In units of kg dx^2/s^2; of one law for all particles; gravity's potential is not in it.
     """
     ((law, _, _),) = problem.config.segments
-    speed = jnp.sum(state.velocity**2, axis=0) + 0.25 * jnp.sum(state.affine**2, axis=(0, 1))
+    speed = jnp.sum(state.velocity**2, axis=0)
+    if problem.config.transfer.scheme.affine:
+        rate = jnp.sum(state.affine**2, axis=(0, 1))
+        speed = speed + rate / problem.config.kernel.inverse_inertia
     history = jnp.zeros((0, state.position.shape[1])) if state.history is None else state.history
+    if law.energy is None:
+        raise InputError(f"energy: the law {law.name} stores none")
     stored = law.energy(problem.model.parameters, state.deformation, history)
     return float(jnp.sum(0.5 * problem.model.mass * speed + problem.model.volume * stored))
 

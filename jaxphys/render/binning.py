@@ -24,28 +24,54 @@ PARTS = 2
 
 
 class Grid(NamedTuple):
-    """Tiles that cover a picture; the last column and row may reach beyond it. Static."""
+    """Tiles that cover a picture; the last column and row may reach beyond it. Static.
+
+    Where several devices share a picture, each has every so-manieth row of tiles, from its `first`
+    one on: rows beside each other hold about as much.
+
+    Attributes:
+        columns, rows: of the whole picture.
+        tile_size: edge of a tile [pixels].
+        share: how many share the rows.
+    """
 
     columns: int
     rows: int
     tile_size: int
+    share: int = 1
+
+    @property
+    def own_rows(self) -> int:
+        """Rows of one of those who share them, the longest share."""
+        return -(-self.rows // self.share)
 
     @property
     def tiles(self) -> int:
-        return self.columns * self.rows
+        """Tiles of one of those who share them."""
+        return self.columns * self.own_rows
+
+    def picture_row(self, row: Array, first: Array) -> Array:
+        """Where the own row of tiles `row` is in the picture."""
+        return row if self.share == 1 else row * self.share + first
+
+    def own_row(self, row: Array, first: Array) -> Array:
+        """How many of the own rows lie before row `row` of the picture."""
+        return row if self.share == 1 else (row - first + self.share - 1) // self.share
 
 
 class Boxes(NamedTuple):
     """Tiles touched by each splat, in order of depth; splats that touch none have count 0.
 
     Attributes:
+        first: which row of tiles is the first own one, see `Grid`, shape ().
         order: which splat is at each depth rank, shape (N,).
-        left, top, columns: the box of tiles, shape (N,) each.
+        left, top, columns: the box of own tiles, shape (N,) each.
         counts: tiles in the box, shape (N,).
         starts: pairs emitted by nearer splats, shape (N,).
         required: pairs emitted by all splats, or 2^31 - 1 if they are more than 2^30.
     """
 
+    first: Array
     order: Array
     left: Array
     top: Array
@@ -70,7 +96,7 @@ class TileLists(NamedTuple):
 def make_grid(width: int, height: int, settings: Settings) -> Grid:
     """The tiles of a picture of `width` x `height` pixels."""
     size = settings.tile_size
-    return Grid(-(-width // size), -(-height // size), size)
+    return Grid(-(-width // size), -(-height // size), size, settings.devices)
 
 
 def depth_order(depths: Array, valid: Array) -> Array:
@@ -82,16 +108,23 @@ def depth_order(depths: Array, valid: Array) -> Array:
     return jnp.argsort(far, stable=True).astype(jnp.int32)
 
 
-def tile_boxes(projected: Projected, grid: Grid, settings: Settings) -> Boxes:
-    """The box of tiles of every splat, and how many pairs that makes."""
+def tile_boxes(
+    projected: Projected, grid: Grid, settings: Settings, first: Array | int = 0
+) -> Boxes:
+    """The box of tiles of every splat, and how many pairs that makes, in the rows of tiles that are
+    shared out to the one whose first row is `first`.
+    """
     projected = Projected(*map(lax.stop_gradient, projected))
     order = depth_order(projected.depths, projected.valid)
     low, high = _pixel_box(projected, grid, settings)
     size = grid.tile_size
     limits = jnp.array([[grid.columns], [grid.rows]], jnp.int32)
-    first = jnp.clip(low // size, 0, limits)
-    last = jnp.clip(-(-high // size), first, limits)
-    columns, rows = last - first
+    begin = jnp.clip(low // size, 0, limits)
+    end = jnp.clip(-(-high // size), begin, limits)
+    left, right = begin[0], end[0]
+    first = jnp.asarray(first, jnp.int32)
+    top, bottom = (grid.own_row(edge[1], first) for edge in (begin, end))
+    columns, rows = right - left, bottom - top
     counts = jnp.where(projected.valid, columns * rows, 0)
 
     # A sum in floating point tells whether the sum in integers can be trusted.
@@ -101,9 +134,10 @@ def tile_boxes(projected: Projected, grid: Grid, settings: Settings) -> Boxes:
     ends = jnp.cumsum(counts, dtype=jnp.int32)
     last_end = ends[-1] if counts.shape[0] else jnp.int32(0)
     return Boxes(
+        first=first,
         order=order,
-        left=first[0][order],
-        top=first[1][order],
+        left=left[order],
+        top=top[order],
         columns=columns[order],
         counts=counts,
         starts=ends - counts,
@@ -195,7 +229,7 @@ def _meets(projected, boxes, owners, column, row, grid, settings) -> Array:
     # Distances centre - pixel over the rectangle of the tile's pixel centres.
     x_high = x - (column * size + 0.5)
     x_low = x_high - (size - 1)
-    y_high = y - (row * size + 0.5)
+    y_high = y - (grid.picture_row(row, boxes.first) * size + 0.5)
     y_low = y_high - (size - 1)
     x_near, y_near = jnp.clip(0, x_low, x_high), jnp.clip(0, y_low, y_high)
 

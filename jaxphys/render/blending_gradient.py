@@ -21,6 +21,7 @@ from jaxphys.render.tile_groups import (
     any_alive,
     blending_weights,
     busy_groups,
+    corners,
     next_chunk,
     pixel_centres,
     splat_alpha,
@@ -52,7 +53,7 @@ def blend_backward(grid, settings, residuals, cotangent):
         index, slots = carry
         group = jax.tree.map(lambda leaf: leaf[index], work)
         size = group.tiles.shape[0]
-        x, y = pixel_centres(group.tiles, grid, dtype)
+        x, y = pixel_centres(group.tiles, boxes.first, grid, dtype)
         safe = jnp.maximum(group.tiles, 0)
         g = cotangent[safe]
 
@@ -77,7 +78,8 @@ def blend_backward(grid, settings, residuals, cotangent):
                 weights, g, (((2,), (2,)), ((0,), (0,))), precision=HIGHEST
             )
             gradient = jnp.concatenate(
-                [_geometry_gradient(rows, moments, group.tiles, grid), by_feature], axis=-1
+                [_geometry_gradient(rows, moments, group.tiles, boxes.first, grid), by_feature],
+                axis=-1,
             )
             where = _emission_slots(boxes, ranks, group, grid, capacity)
             slots = slots.at[where].set(gradient, mode="drop", unique_indices=True)
@@ -125,16 +127,19 @@ def _monomials(grid: Grid, dtype) -> Array:
     return jnp.stack([jnp.ones_like(x), x, y, x * x, x * y, y * y], axis=-1)
 
 
-def _geometry_gradient(rows: Array, moments: Array, tiles: Array, grid: Grid) -> Array:
+def _geometry_gradient(
+    rows: Array, moments: Array, tiles: Array, first: Array, grid: Grid
+) -> Array:
     """Gradient with respect to the six numbers of each splat from the moments of the slope.
 
     With s the gradient with respect to the exponent at a pixel, all six are sums of s times a
     polynomial of degree two in the pixel's position, hence of the six moments (G, C, 6).
     """
-    size = grid.tile_size
+    half = 0.5 * grid.tile_size
     mx, my, a, b, c, opacity = (rows[..., k] for k in range(6))
-    x = mx - (tiles % grid.columns * size + 0.5 * size)[:, None].astype(rows.dtype)
-    y = my - (tiles // grid.columns * size + 0.5 * size)[:, None].astype(rows.dtype)
+    left, top = corners(tiles, first, grid)
+    x = mx - (left + half)[:, None].astype(rows.dtype)
+    y = my - (top + half)[:, None].astype(rows.dtype)
     m, m_x, m_y, m_xx, m_xy, m_yy = (moments[..., k] for k in range(6))
     # Moments of s about the centre of the splat: dx = x - pixel and so on.
     s_x, s_y = x * m - m_x, y * m - m_y

@@ -8,9 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
+from jaxphys.core.ensemble import over_devices
 from jaxphys.core.errors import InputError
 from jaxphys.core.splats import Splats
-from jaxphys.render.binning import MOST_PAIRS, make_grid, tile_boxes, tile_lists
+from jaxphys.render.binning import MOST_PAIRS, UNCOUNTABLE, make_grid, tile_boxes, tile_lists
 from jaxphys.render.blending import blend
 from jaxphys.render.camera import Camera
 from jaxphys.render.projection import project
@@ -86,9 +87,16 @@ def required_pairs(splats: Splats, camera: Camera, settings: Settings = DEFAULT)
     if splats.means.shape[0] == 0:
         return jnp.int32(0)
     projected = project(splats, camera, settings)
-    return tile_boxes(
-        projected, make_grid(camera.width, camera.height, settings), settings
-    ).required
+    grid = make_grid(camera.width, camera.height, settings)
+    each = [tile_boxes(projected, grid, settings, k).required for k in range(grid.share)]
+    return _required_together(jnp.stack(each))
+
+
+def _required_together(each: Array) -> Array:
+    """Room that all need who share a picture, each having as much of it, from what each needs."""
+    most = jnp.max(each)
+    countable = most <= MOST_PAIRS // each.shape[0]
+    return jnp.where(countable, most * each.shape[0], UNCOUNTABLE)
 
 
 def next_capacity(required: int) -> int:
@@ -122,10 +130,6 @@ def _render(splats, camera, background, settings, capacity) -> Image:
 
     grid = make_grid(width, height, settings)
     projected = project(splats, camera, settings)
-    boxes = tile_boxes(projected, grid, settings)
-    frozen = jax.tree.map(lax.stop_gradient, projected)
-    lists = tile_lists(frozen, boxes, grid, settings, capacity)
-    geometry = jnp.concatenate([projected.centres, projected.factors, projected.opacities[None]])
     valid = projected.valid
     features = jnp.concatenate(
         [
@@ -134,13 +138,33 @@ def _render(splats, camera, background, settings, capacity) -> Image:
             jnp.ones((1, valid.shape[0]), dtype),
         ]
     )
-    tiles = blend(geometry, features, boxes, lists, grid, settings)
+    own_capacity = -(-capacity // grid.share)
+
+    def own_tiles(first: Array) -> tuple[Array, Array]:
+        return _tiles(projected, features, first, grid, settings, own_capacity)
+
+    if grid.share == 1:
+        tiles, required = own_tiles(jnp.int32(0))
+    else:
+        share = over_devices(own_tiles, grid.share)
+        tiles, each = share(jnp.arange(grid.share, dtype=jnp.int32))
+        required = _required_together(each)
     size = grid.tile_size
-    picture = tiles.reshape(grid.rows, grid.columns, -1, size, size).transpose(0, 3, 1, 4, 2)
-    picture = picture.reshape(grid.rows * size, grid.columns * size, -1)[:height, :width]
+    picture = tiles.reshape(grid.share, grid.own_rows, grid.columns, -1, size, size)
+    picture = picture.transpose(1, 0, 4, 2, 5, 3)
+    picture = picture.reshape(-1, grid.columns * size, picture.shape[-1])[:height, :width]
     colour, depth, alpha = picture[..., :-2], picture[..., -2], picture[..., -1]
     colour = colour + (1 - alpha)[..., None] * background
-    return Image(colour, alpha, depth, boxes.required, boxes.required > capacity)
+    return Image(colour, alpha, depth, required, required > grid.share * own_capacity)
+
+
+def _tiles(projected, features, first, grid, settings, capacity) -> tuple[Array, Array]:
+    """Blended features of own tiles (tiles, F, tile_size^2), and the pairs that they need."""
+    boxes = tile_boxes(projected, grid, settings, first)
+    frozen = jax.tree.map(lax.stop_gradient, projected)
+    lists = tile_lists(frozen, boxes, grid, settings, capacity)
+    geometry = jnp.concatenate([projected.centres, projected.factors, projected.opacities[None]])
+    return blend(geometry, features, boxes, lists, grid, settings), boxes.required
 
 
 def _concrete(value: Array):

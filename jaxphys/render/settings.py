@@ -35,6 +35,9 @@ class Settings:
             Kerbl et al. 2023 do; the true derivative there is zero, which is the default.
         chunk_size, group_size: how the blending loop is cut up: so many splats of a tile at a time,
             for so many tiles at a time. `group_size` None takes what suits the tile. Speed only.
+        devices: so many, the first of `jax.devices()`, share the rows of tiles of one picture. For
+            a large picture by itself; several pictures are better drawn side by side
+            (`jaxphys.over_devices`), within which this must be 1.
     """
 
     tile_size: int = 8
@@ -50,6 +53,7 @@ class Settings:
     gradient_through_clamp: bool = False
     chunk_size: int = 8
     group_size: int | None = None
+    devices: int = 1
 
     def __post_init__(self):
         def require(holds: bool, field: str, remedy: str) -> None:
@@ -74,6 +78,7 @@ class Settings:
         )
         require(0 <= self.transmittance_min < 1, "transmittance_min", "must lie in [0, 1)")
         require(self.chunk_size >= 1, "chunk_size", "must be at least 1")
+        require(self.devices >= 1, "devices", "must be at least 1")
         require(self.group_size is None or self.group_size >= 1, "group_size", "must be at least 1")
 
     @classmethod

@@ -8,7 +8,7 @@ next C splats of each tile's list.
 from typing import NamedTuple
 
 import jax.numpy as jnp
-from jax import Array
+from jax import Array, lax
 
 from jaxphys.render.binning import Grid, TileLists
 from jaxphys.render.settings import Settings
@@ -53,12 +53,19 @@ def busy_groups(work: Work) -> Array:
     return jnp.sum(jnp.any(work.lengths > 0, axis=1), dtype=jnp.int32)
 
 
-def pixel_centres(tiles: Array, grid: Grid, dtype) -> tuple[Array, Array]:
+def corners(tiles: Array, first: Array, grid: Grid) -> tuple[Array, Array]:
+    """First pixel of each tile in the picture, shapes (G,); `first` as in `Boxes`."""
+    row = grid.picture_row(tiles // grid.columns, first)
+    return tiles % grid.columns * grid.tile_size, row * grid.tile_size
+
+
+def pixel_centres(tiles: Array, first: Array, grid: Grid, dtype) -> tuple[Array, Array]:
     """Pixel centres of each tile, shapes (G, 1, P)."""
     size = grid.tile_size
     local = jnp.arange(size * size)
-    x = (tiles % grid.columns * size)[:, None] + local % size
-    y = (tiles // grid.columns * size)[:, None] + local // size
+    left, top = corners(tiles, first, grid)
+    x = left[:, None] + local % size
+    y = top[:, None] + local // size
     return x[:, None, :].astype(dtype) + 0.5, y[:, None, :].astype(dtype) + 0.5
 
 
@@ -80,8 +87,11 @@ def splat_alpha(rows: Array, x: Array, y: Array, settings: Settings) -> tuple[Ar
     u = a * (mx - x) + b * dy
     v = c * dy
     raw = opacity * jnp.exp(-0.5 * (u * u + v * v))
-    alpha = jnp.where(raw >= settings.alpha_min, jnp.minimum(raw, settings.alpha_max), 0)
-    return raw, alpha
+    clamped = jnp.minimum(raw, settings.alpha_max)
+    if settings.gradient_through_clamp:
+        # Tangents pass as if there were no clamp; the gradient's rule says so for itself.
+        clamped = lax.stop_gradient(clamped) + (raw - lax.stop_gradient(raw))
+    return raw, jnp.where(raw >= settings.alpha_min, clamped, 0)
 
 
 def transmittances(alpha: Array, light: Array) -> tuple[Array, Array]:

@@ -2,13 +2,21 @@
 the plan.
 """
 
+from jaxphys.mpm.boundaries import Ball as Ball
 from jaxphys.mpm.boundaries import Box as Box
+from jaxphys.mpm.boundaries import Capsule as Capsule
+from jaxphys.mpm.boundaries import Cuboid as Cuboid
 from jaxphys.mpm.boundaries import Cut as Cut
+from jaxphys.mpm.boundaries import Cylinder as Cylinder
 from jaxphys.mpm.boundaries import Damping as Damping
+from jaxphys.mpm.boundaries import Free as Free
 from jaxphys.mpm.boundaries import Impulse as Impulse
+from jaxphys.mpm.boundaries import Keyframes as Keyframes
+from jaxphys.mpm.boundaries import MeshObstacle as MeshObstacle
 from jaxphys.mpm.boundaries import Plane as Plane
 from jaxphys.mpm.boundaries import Release as Release
 from jaxphys.mpm.boundaries import Rotate as Rotate
+from jaxphys.mpm.boundaries import Steady as Steady
 from jaxphys.mpm.boundaries import Translate as Translate
 from jaxphys.mpm.boundaries import Walls as Walls
 

@@ -24,10 +24,14 @@ from jaxphys.mpm.materials.catalogue import (
 )
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, State, initial_state
+from jaxphys.mpm.stepping import Fixed
 from jaxphys.mpm.stepping.fixed import choose_substep
+from jaxphys.mpm.transfer.kernels import Kernel
 from jaxphys.scene.look import Look, look_of
+from jaxphys.scene.obstacles import sampled
 from jaxphys.scene.place import Placed, place
 from jaxphys.scene.scene import Object, Scene
+from jaxphys.scene.solids import solids_of
 
 
 class Built(NamedTuple):
@@ -107,7 +111,7 @@ def place_objects(scene: Scene, objects: tuple[Gaussians, ...]) -> tuple[Placed,
         )
     grid = solver_grid(scene)
     return tuple(
-        place(gaussians, thing, grid, f"objects[{i}]", scene.seed + i)
+        place(gaussians, thing, grid, scene.transfer.spline, f"objects[{i}]", scene.seed + i)
         for i, (gaussians, thing) in enumerate(zip(objects, scene.objects, strict=True))
     )
 
@@ -135,10 +139,10 @@ def particles_of(placed: Placed, thing: Object) -> Particles:
     )
 
 
-def arrangement_of(parts: list[Particles], grid: Grid) -> np.ndarray:
+def arrangement_of(parts: list[Particles], grid: Grid, kernel: Kernel) -> np.ndarray:
     """Which particle, in the objects' order, the solver keeps at each of its places (N,)."""
     starts = np.cumsum([0, *(len(part.positions) for part in parts)])
-    orders = [cell_order(part.positions, grid) for part in parts]
+    orders = [cell_order(part.positions, grid, kernel=kernel) for part in parts]
     return np.concatenate([start + order for start, order in zip(starts, orders, strict=False)])
 
 
@@ -158,6 +162,7 @@ def solver_parts(
         track_total=scene.splats_follow == "total",
         check_step=not scene.unsafe_substep,
         placement=suited(len(arrangement)),
+        transfer=scene.transfer,
     )
 
     def gathered(name: str) -> np.ndarray:
@@ -165,7 +170,7 @@ def solver_parts(
 
     positions, volumes = gathered("positions"), gathered("volumes")
     setting = Setting(grid, positions, volumes, dtype)
-    boundaries = prepare(scene.boundaries, setting)
+    boundaries = prepare(sampled(scene), setting)
     if scene.damping > 0:
         boundaries = (*boundaries, Damping(scene.damping).prepared(setting))
     state = initial_state(
@@ -210,7 +215,7 @@ def build(
     placed = place_objects(scene, objects) if placed is None else placed
     grid = solver_grid(scene)
     parts = [particles_of(one, thing) for one, thing in zip(placed, scene.objects, strict=True)]
-    arrangement = arrangement_of(parts, grid)
+    arrangement = arrangement_of(parts, grid, scene.transfer.spline)
     config, model, state = solver_parts(scene, parts, arrangement, dtype)
     dt, steps, _ = choose_substep(
         config,
@@ -231,5 +236,9 @@ def build(
         dt=dt,
         steps=steps,
         given_substep=scene.substep,
+        stepping=scene.stepping or Fixed(),
     )
-    return Built(simulation, look_of(placed, scene.regularise_colours))
+    solids: tuple = ()
+    if scene.obstacle_colour is not None:
+        solids = solids_of(model.boundaries, scene.obstacle_colour, scene.seed)
+    return Built(simulation, look_of(placed, scene.regularise_colours, solids))

@@ -6,6 +6,8 @@ that a second of motion takes some hundred steps on the coarse grid.
 """
 
 from collections.abc import Callable
+from functools import partial
+from typing import Literal
 
 from jaxphys.mpm.boundaries import Plane, Vector, Walls
 from jaxphys.mpm.materials.catalogue import get_material
@@ -33,7 +35,8 @@ def default_scene(material: str, *, spacing: float = SPACING) -> Scene:
         InputError: an unknown material, with the nearest names, or a spacing out of range.
     """
     get_material(material)
-    return _SCENES[material](Domain((SIDE, SIDE, FLOOR + HEIGHT), spacing))
+    made = _SCENES.get(material, partial(_dropped, material))
+    return made(Domain((SIDE, SIDE, FLOOR + HEIGHT), spacing))
 
 
 def _scene(thing: Object, domain: Domain, friction: float, **fields) -> Scene:
@@ -125,10 +128,75 @@ def _fracture(domain: Domain) -> Scene:
     return _scene(thing, domain, friction=0.7, splats_follow="elastic")
 
 
+def _dropped(
+    material: str,
+    domain: Domain,
+    *,
+    size: float = 0.75,
+    gap: float = 0.1,
+    speed: float = 1.0,
+    friction: float = 0.5,
+    follow: Literal["total", "elastic"] = "elastic",
+    rotation: tuple[Rotation, ...] = (),
+    damping: float = 0.0,
+) -> Scene:
+    """Let fall: what most materials are told by."""
+    thing = Object(
+        material=material,
+        size=size,
+        centre=_above(gap, size),
+        velocity=(0.0, 0.0, -speed),
+        rotation=rotation,
+        filling=Filling(show=True),
+    )
+    return _scene(thing, domain, friction=friction, splats_follow=follow, damping=damping)
+
+
+def _water(domain: Domain) -> Scene:
+    return _dropped("water", domain, size=0.7, gap=0.3, speed=1.0, friction=0.0)
+
+
+def _cream(domain: Domain) -> Scene:
+    return _dropped("cream", domain, friction=0.8)
+
+
+def _toothpaste(domain: Domain) -> Scene:
+    return _dropped("toothpaste", domain, gap=0.03, speed=0.3, friction=0.8)
+
+
+def _plasticine(domain: Domain) -> Scene:
+    turn = (Rotation((0.0, 1.0, 0.0), 25.0),)
+    return _dropped("plasticine", domain, gap=0.3, speed=5.0, follow="total", rotation=turn)
+
+
+def _snow(domain: Domain) -> Scene:
+    return _dropped("snow", domain, gap=0.2, speed=5.0)
+
+
+def _wet_sand(domain: Domain) -> Scene:
+    return _dropped("wet-sand", domain, gap=0.3, speed=3.0, friction=0.7)
+
+
+def _memory_foam(domain: Domain) -> Scene:
+    return _dropped("memory-foam", domain, gap=0.2, speed=2.0, follow="total")
+
+
+def _muscle(domain: Domain) -> Scene:
+    return _dropped("muscle", domain, gap=0.1, speed=1.0, friction=0.2, follow="total", damping=2.5)
+
+
 _SCENES: dict[str, Callable[[Domain], Scene]] = {
     "elastic": _elastic,
     "jelly": _jelly,
     "metal": _metal,
     "sand": _sand,
     "fracture": _fracture,
+    "water": _water,
+    "cream": _cream,
+    "toothpaste": _toothpaste,
+    "plasticine": _plasticine,
+    "snow": _snow,
+    "wet-sand": _wet_sand,
+    "memory-foam": _memory_foam,
+    "muscle": _muscle,
 }

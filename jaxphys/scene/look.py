@@ -9,13 +9,14 @@ import numpy as np
 
 from jaxphys.gaussians.colour import ColourRange, colour_range, to_unit_interval
 from jaxphys.gaussians.gaussians import Gaussians, concatenate
+from jaxphys.mpm.boundaries import Obstacle
 from jaxphys.scene.place import Placed
 from jaxphys.scene.placement import Placement
 
 
 @partial(
     jax.tree_util.register_dataclass,
-    data_fields=("gaussians", "still", "colours"),
+    data_fields=("gaussians", "still", "colours", "solids"),
     meta_fields=("counts", "lone", "placements"),
 )
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Look:
         counts: moving Gaussians of each object.
         lone: Gaussians beside each object that were left out, since nothing would hold them to it.
         placements: where the contents of each object's file are, for cameras that stood there.
+        solids: of each obstacle that is drawn its Gaussians, in axes of its own, and the obstacle,
+            which says where these are.
     """
 
     gaussians: Gaussians
@@ -38,6 +41,7 @@ class Look:
     counts: tuple[int, ...]
     lone: tuple[int, ...]
     placements: tuple[Placement, ...]
+    solids: tuple[tuple[Gaussians, Obstacle], ...] = ()
 
     @property
     def objects(self) -> tuple[tuple[int, int], ...]:
@@ -45,8 +49,12 @@ class Look:
         return tuple(pairwise(np.cumsum([0, *self.counts]).tolist()))
 
 
-def look_of(placed: tuple[Placed, ...], regularise_colours: bool) -> Look:
-    """The look of objects that are in their places."""
+def look_of(
+    placed: tuple[Placed, ...],
+    regularise_colours: bool,
+    solids: tuple[tuple[Gaussians, Obstacle], ...] = (),
+) -> Look:
+    """The look of objects that are in their places, and of obstacles among them."""
     still = [one.still for one in placed if one.still.count]
     # The paper's range would also stretch the contrast of colours that are right already.
     ranges = tuple(to_unit_interval(colour_range(one.moving)) for one in placed)
@@ -57,4 +65,5 @@ def look_of(placed: tuple[Placed, ...], regularise_colours: bool) -> Look:
         counts=tuple(one.moving.count for one in placed),
         lone=tuple(one.lone for one in placed),
         placements=tuple(one.placement for one in placed),
+        solids=solids,
     )

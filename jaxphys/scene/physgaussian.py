@@ -27,10 +27,11 @@ MATERIALS = {
     "jelly": ("jelly", None),
     "metal": ("metal", None),
     "sand": ("sand", None),
-    "foam": ("metal", "foam is visco-plastic there; here it yields like metal, without viscosity"),
-    "plasticine": ("metal", "plasticine softens as it yields there; here it yields like metal"),
-    "snow": ("sand", "snow has no stress at all there and falls as dust; here it is sand"),
+    "foam": ("plasticine", "foam is the law that is called plasticine here"),
+    "plasticine": ("plasticine", None),
+    "snow": ("snow", "snow has no stress at all there and falls as dust; here it is snow"),
 }
+GRAINS = ("sand", "snow")
 
 
 @dataclass(frozen=True)
@@ -64,16 +65,26 @@ def _parameters(config: Config, material: str, notes: list[str]) -> dict[str, fl
             parameters["hardening"] = twice_mu * config.xi / UNIAXIAL**2
         elif config.hardening != 0:
             notes.append("hardening: only the value 1 switches it on; left off")
+    if config.material == "foam":
+        parameters["yield_stress"] = config.yield_stress
+        # Theirs multiplies the norm of the rate of flow, which in shear is the rate over sqrt(2).
+        parameters["plastic_viscosity"] = (config.plastic_viscosity or 0.0) / 2
+        notes.append("foam: their stress carries an extra factor of the stretch, as metal's does")
+    if config.material == "plasticine":
+        parameters["yield_stress"] = config.yield_stress / UNIAXIAL
+        parameters["plastic_viscosity"] = 0.0
+        notes.append("plasticine: their stress is fixed corotated's; here it is Hencky's")
     if material == "sand":
         parameters["friction_angle"] = config.friction_angle
         notes.append("sand: their particles share one mean volume; here each has its own")
         notes.append("sand: volume gained in separation is corrected here (Tampubolon et al. 2017)")
-    for key, why in {
-        "plastic_viscosity": "no law here is viscous",
-        "softening": "belongs to plasticine",
+    left_out = {
+        "plastic_viscosity": "belongs to foam",
+        "softening": "no law here loses its yield stress",
         "rpic_damping": "transfers here are APIC",
-    }.items():
-        if getattr(config, key):
+    }
+    for key, why in left_out.items():
+        if getattr(config, key) and (key, config.material) != ("plastic_viscosity", "foam"):
             notes.append(f"{key}: left out, {why}")
     if config.pic_damping is not None:
         notes.append("pic_damping: read but never used by PhysGaussian; left out")
@@ -178,10 +189,10 @@ def _scene(config: Config, cameras: tuple[FiledCamera, ...] | None, notes: list[
     if abs(steps - round(steps)) > 1e-6 * steps:
         notes.append(f"substep_dt: theirs runs {int(steps)} whole steps a frame; here time adds up")
     notes.append("bounds: leaving the grid or losing finiteness stops the run with an error here")
-    # Theirs always follow the elastic part. Of grains it is all that makes sense; metal that stays
-    # bent would show it in its splats' places but not in their shapes.
-    follow: Literal["elastic", "total"] = "elastic" if material == "sand" else "total"
-    if material == "metal":
+    # Theirs always follow the elastic part. Of grains it is all that makes sense; what stays bent
+    # would show it in its splats' places but not in their shapes.
+    follow: Literal["elastic", "total"] = "elastic" if material in GRAINS else "total"
+    if material in ("metal", "plasticine"):
         notes.append(
             "rendering: splats follow the total deformation here, theirs its elastic part only"
         )

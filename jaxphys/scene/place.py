@@ -24,6 +24,7 @@ from jaxphys.gaussians.lone import lone_points
 from jaxphys.gaussians.relax import blue_noise
 from jaxphys.gaussians.volumes import cell_volumes
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.transfer.kernels import Kernel
 from jaxphys.scene.placement import Placement
 from jaxphys.scene.scene import Object
 
@@ -71,7 +72,9 @@ def rotation_matrix(thing: Object, where: str) -> np.ndarray:
     return total
 
 
-def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str, seed: int) -> Placed:
+def place(
+    gaussians: Gaussians, thing: Object, grid: Grid, kernel: Kernel, where: str, seed: int
+) -> Placed:
     """The Gaussians of an object in the domain, its filling and its volumes.
 
     All but the last shift happens about the object's own middle, so that it is filled and weighs
@@ -80,7 +83,7 @@ def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str, seed: int
     Args:
         gaussians: in the units of their file.
         thing: what is asked for.
-        grid: of the solver.
+        grid, kernel: of the solver.
         where: the object's name in messages.
         seed: of the filling.
 
@@ -112,7 +115,7 @@ def place(gaussians: Gaussians, thing: Object, grid: Grid, where: str, seed: int
     own = transform(gaussians, scale=scale, translation=-scale * middle)
     moving, still = (select(own, np.flatnonzero(which)) for which in (kept, ~chosen))
     centre = np.array(thing.centre)
-    _require_inside(np.asarray(moving.means) + centre, grid, where)
+    _require_inside(np.asarray(moving.means) + centre, grid, kernel, where)
     filled = _fill(moving, thing, grid, seed, where)
     filling, volumes = filled.points, filled.volumes
     if thing.filling is not None and thing.filling.show and len(filling):
@@ -182,10 +185,10 @@ def _numbers(values) -> str:
     return "(" + ", ".join(f"{value:.3g}" for value in values) + ")"
 
 
-def _require_inside(points: np.ndarray, grid: Grid, where: str) -> None:
+def _require_inside(points: np.ndarray, grid: Grid, kernel: Kernel, where: str) -> None:
     low, high = points.min(0), points.max(0)
     # One cell more than the solver needs, so that the first steps have somewhere to go.
-    first, last = grid.lower + grid.spacing, np.array(grid.upper) - grid.spacing
+    first, last = grid.lower(kernel) + grid.spacing, np.array(grid.upper(kernel)) - grid.spacing
     if np.any(low < first) or np.any(high > last):
         raise InputError(
             f"{where}: reaches from {_numbers(low)} to {_numbers(high)} m, but the domain holds "

@@ -5,7 +5,7 @@ in degrees.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from jaxphys.core.errors import InputError
@@ -13,13 +13,16 @@ from jaxphys.core.fields import (
     DURATION,
     LENGTH,
     PLACE,
+    RATE,
     SEED,
     SPEED,
     Checked,
     between,
 )
 from jaxphys.mpm.boundaries import AnyBoundary, Vector
-from jaxphys.scene.view import ANGLE, RATE, View
+from jaxphys.mpm.stepping import Adaptive, Fixed, Stepping
+from jaxphys.mpm.transfer.schemes import Transfer
+from jaxphys.scene.view import ANGLE, View
 
 Area = tuple[float, float, float, float, float, float]
 
@@ -216,16 +219,22 @@ class Scene(Checked):
         gravity: [m/s^2].
         boundaries: in the order in which they act.
         domain: the simulated box and its grid.
+        transfer: how particles and grid exchange velocities.
         damping: the grid's velocity decays at this rate [1/s].
         frames: pictures of the video, the first one at rest.
         fps: pictures a second of the video.
         frame_time: simulated time between pictures [s]; null: 1 / fps, real time.
-        substep: time step [s]; null: as large as the bounds allow.
+        stepping: how a frame is stepped through: "fixed" takes equal steps, "adaptive" looks at the
+            bounds again every few steps. null: adaptive in films (`animate`, `generate`), and fixed
+            elsewhere, where a gradient may be wanted.
+        substep: time step [s], which makes steps fixed; null: as large as the bounds allow.
         unsafe_substep: take `substep` even beyond the bounds.
         camera: where from.
         width, height: of the pictures [pixels].
         background: red, green, blue in [0, 1].
         ground: null draws none.
+        obstacle_colour: red, green, blue in [0, 1] of the obstacles that keep matter out; null
+            draws none. Containers, planes and walls are never drawn.
         splats_follow: "total" stretches splats with all of the deformation, so that bent metal
             stays
             bent; "elastic" leaves out plastic flow, so that grains stay grains.
@@ -238,10 +247,12 @@ class Scene(Checked):
     gravity: Vector = field(default=(0.0, 0.0, -9.81), metadata=between(-1e6, 1e6))
     boundaries: tuple[AnyBoundary, ...] = ()
     domain: Domain = Domain()
+    transfer: Transfer = Transfer()
     damping: float = field(default=0.0, metadata=between(0, 1e12))
     frames: int = field(default=48, metadata=between(1, 100_000))
     fps: float = field(default=24.0, metadata=between(0.1, 1000.0))
     frame_time: float | None = field(default=None, metadata=between(1e-9, 1e6))
+    stepping: Stepping | None = None
     substep: float | None = field(default=None, metadata=DURATION)
     unsafe_substep: bool = False
     camera: View = View()
@@ -249,6 +260,7 @@ class Scene(Checked):
     height: int = field(default=1090, metadata=between(8, 8192))
     background: Vector = field(default=(1.0, 1.0, 1.0), metadata=between(0, 1))
     ground: Ground | None = None
+    obstacle_colour: Vector | None = field(default=(0.45, 0.5, 0.58), metadata=between(0, 1))
     splats_follow: Literal["total", "elastic"] = "total"
     regularise_colours: bool = True
     seed: int = field(default=0, metadata=SEED)
@@ -258,6 +270,17 @@ class Scene(Checked):
         super().__post_init__()
         if not self.objects:
             raise InputError("objects: a scene needs at least one object")
+        if self.substep is not None and self.stepping not in (None, Fixed()):
+            raise InputError(
+                f"substep: {self.substep} is a fixed step, but stepping is not; leave out one of "
+                "them"
+            )
+
+    def filmed(self) -> "Scene":
+        """The same scene with the stepping that films have where it names none."""
+        if self.stepping is not None:
+            return self
+        return replace(self, stepping=Adaptive() if self.substep is None else Fixed())
 
     @property
     def seconds_per_frame(self) -> float:

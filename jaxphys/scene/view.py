@@ -6,11 +6,10 @@ from typing import Literal
 import numpy as np
 
 from jaxphys.core.errors import InputError
-from jaxphys.core.fields import LENGTH, PLACE, SPEED, Checked, between, direction
+from jaxphys.core.fields import LENGTH, PLACE, RATE, SPEED, Checked, between, direction
 from jaxphys.mpm.boundaries import Vector
 
 ANGLE = between(-1e6, 1e6)
-RATE = between(-1e6, 1e6)
 Z: Vector = (0.0, 0.0, 1.0)
 
 

@@ -1,8 +1,7 @@
 import json
 
 from jaxphys.cli.listing import materials_text
-from jaxphys.mpm.materials.catalogue import MATERIALS
-from jaxphys.mpm.materials.parameters import RANGES
+from jaxphys.mpm.materials.catalogue import MATERIALS, declared_parameters
 
 
 def test_every_parameter_is_explained_where_it_is_listed():
@@ -14,7 +13,7 @@ def test_every_parameter_is_explained_where_it_is_listed():
         assert f"{name}: {material.description}" in text
         told = listed[name]["parameters"]
         for key, value in material.defaults.items():
-            allowed = RANGES[key]
+            allowed = material.declared[key]
             assert told[key] == {
                 "default": value,
                 "meaning": allowed.meaning,
@@ -22,7 +21,7 @@ def test_every_parameter_is_explained_where_it_is_listed():
                 "range": allowed.text,
             }
             assert f"{key} {value:g} {allowed.unit}".strip() in text
-    for key, allowed in RANGES.items():
+    for key, allowed in declared_parameters().items():
         assert text.count(allowed.meaning) == 1 and f"{allowed.text}" in text, key
 
 

@@ -9,11 +9,14 @@ from jaxphys.mpm.loop.rollout import rollout
 from tests.mpm.cases import block
 
 
+@pytest.mark.parametrize("in_turn", [False, True])
 @pytest.mark.parametrize("members", [1, 3, 4, 9])
-def test_any_number_of_members_on_any_number_of_devices(members):
+def test_any_number_of_members_on_any_number_of_devices(members, in_turn):
     x = jnp.arange(2.0 * members).reshape(members, 2)
     for devices in {1, jax.device_count()}:
-        many = over_devices(lambda v, w: {"sum": jnp.sum(v) * w, "twice": 2 * v}, devices)
+        many = over_devices(
+            lambda v, w: {"sum": jnp.sum(v) * w, "twice": 2 * v}, devices, in_turn=in_turn
+        )
         found = many(x, x[:, 0])
         np.testing.assert_allclose(found["sum"], np.asarray(x).sum(1) * np.asarray(x[:, 0]))
         np.testing.assert_array_equal(found["twice"], 2 * x)
@@ -23,6 +26,17 @@ def test_gradients_go_through():
     x = jnp.array([0.3, -1.2, 2.0])
     slope = jax.grad(lambda x: jnp.sum(over_devices(jnp.sin)(x) ** 2))(x)
     np.testing.assert_allclose(slope, np.sin(2 * x), rtol=1e-12)
+
+
+@pytest.mark.parametrize("in_turn", [False, True])
+def test_gradients_reach_what_is_closed_over(in_turn):
+    x = jnp.array([0.3, -1.2, 2.0, 0.7, 1.1])
+
+    def total(a):
+        return jnp.sum(over_devices(lambda x: jnp.sin(a * x), in_turn=in_turn)(x))
+
+    for slope in (jax.grad(total), jax.jit(jax.grad(total)), jax.jacfwd(total)):
+        np.testing.assert_allclose(slope(2.0), np.sum(x * np.cos(2 * x)), rtol=1e-12)
 
 
 def test_a_sweep_of_simulations_is_each_of_them():

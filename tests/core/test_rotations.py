@@ -5,6 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from jaxphys.core import rotations
+from jaxphys.core.rotations import (
+    quaternion_product,
+    quaternion_to_rotation_vector,
+    rotation_vector_to_quaternion,
+)
 
 
 def quaternions(dtype, count=200):
@@ -47,3 +52,25 @@ def test_axis_angle_turns_by_the_right_hand_rule():
     np.testing.assert_allclose(
         rotations.axis_angle_to_matrix(jnp.asarray(axis), 0.7), expected, atol=1e-14
     )
+
+
+def test_rotation_vectors_and_products_agree_with_scipy():
+    random = np.random.default_rng(5)
+    vectors = random.normal(size=(6, 3)) * np.array([1, 1e-3, 1e-5, 1e-9, 0, 2.0])[:, None]
+    vectors[5] *= 3.1 / np.linalg.norm(vectors[5])
+    rotations = Rotation.from_rotvec(vectors)
+    ours = rotation_vector_to_quaternion(jnp.asarray(vectors))
+    theirs = np.roll(rotations.as_quat(), 1, axis=1)
+    theirs *= np.sign(theirs[:, :1])
+    np.testing.assert_allclose(ours, theirs, atol=1e-15)
+    np.testing.assert_allclose(quaternion_to_rotation_vector(-ours), vectors, atol=1e-14)
+    product = quaternion_product(ours[:3], ours[3:])
+    expected = (rotations[:3] * rotations[3:]).as_rotvec()
+    np.testing.assert_allclose(quaternion_to_rotation_vector(product), expected, atol=1e-14)
+
+
+def test_rotation_vectors_have_derivatives_at_rest():
+    there = jax.jacfwd(rotation_vector_to_quaternion)(jnp.zeros(3))
+    np.testing.assert_allclose(there, np.concatenate([np.zeros((1, 3)), 0.5 * np.eye(3)]))
+    back = jax.jacrev(quaternion_to_rotation_vector)(jnp.array([1.0, 0, 0, 0]))
+    np.testing.assert_allclose(back, np.concatenate([np.zeros((3, 1)), 2 * np.eye(3)], 1))

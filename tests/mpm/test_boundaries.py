@@ -270,7 +270,9 @@ def test_an_impulse_gives_its_region_force_times_time_as_one_body(rest, mass, sp
 
     def given(boundary, time=0.0):
         made = ready(boundary, rest)
-        return np.asarray(made.impulse(rest.T, speed, None, made.loads(model, GRID), time, 0.01)[0])
+        return np.asarray(
+            made.impulse(rest.T, speed, None, made.loads(model, GRID), time, 0.01, 0.01)[0]
+        )
 
     chosen = (rest < 0.5).all(1)
     momentum = given(push)

@@ -29,7 +29,7 @@ from jaxphys.mpm.loop.rollout import rollout
 from jaxphys.mpm.materials.catalogue import MATERIALS, material_values
 from jaxphys.mpm.state import OK, STEP_TOO_LARGE, UNSTABLE_STEP, Config, Model, initial_state
 
-from .cases import block
+from .cases import KINDS, block
 
 DEVICES = 4
 PLACEMENTS = [Placement(1, 16), Placement(2), Placement(2, 16), Placement(4, 16)]
@@ -39,7 +39,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-def mixed(dtype, boundaries=(), names=tuple(MATERIALS), count=150):
+def mixed(dtype, boundaries=(), names=KINDS, count=150):
     """Materials side by side, in motion, strained into yielding: (config, model, state)."""
     random = np.random.default_rng(3)
     config, model, state = block(count=count, dtype=dtype)

@@ -9,7 +9,7 @@ import pytest
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.loop import rollout as rollouts
 from jaxphys.mpm.loop.frames import advance_frame, rollout_frames
-from jaxphys.mpm.loop.one_pass import one_pass
+from jaxphys.mpm.loop.pass_derivative import one_pass
 from jaxphys.mpm.loop.rollout import rollout, step
 from jaxphys.mpm.loop.sorting import cell_order, inverse_order
 from jaxphys.mpm.loop.status import SimulationError, check

@@ -27,7 +27,7 @@ from jaxphys.mpm.state import (
 )
 from jaxphys.mpm.stepping.bounds import isolated_bound, present_bounds
 
-from .cases import block, count_primitives
+from .cases import KINDS, block, count_primitives
 from .test_step import remembering
 
 SPACING = 0.1
@@ -151,10 +151,14 @@ ONE[13] = np.diag([1.0, 1.0, -0.5])
 FLAT = np.broadcast_to(np.diag([1.0, 1.0, 5e-4]), (27, 3, 3))
 
 
-@pytest.mark.parametrize("name", list(MATERIALS))
+@pytest.mark.parametrize(
+    "name", [n if n in KINDS else pytest.param(n, marks=pytest.mark.slow) for n in MATERIALS]
+)
 def test_what_is_inside_out_or_flat_is_never_sound(name):
     run = None
     for F, code, particle in ((MIRROR, INVERTED, 0), (ONE, INVERTED, 13), (FLAT, COLLAPSED, 0)):
+        if F is FLAT and name == "snow":
+            continue  # it gives way: the volume is gone for good, and what is left is sound
         config, model, state = material_block(name, F)
         run = run or jax.jit(partial(rollout, replace(config, check_step=False), steps=3))
         end = run(model, state, dt=1e-6)

@@ -139,7 +139,7 @@ def test_failures_name_the_first_step_and_particle(dtype):
 def remembering(rows, plastic=False):
     """A law that counts its calls in its last history row; plastic: forgets all deformation."""
 
-    def update(parameters, F, history):
+    def update(parameters, F, history, dt):
         if rows:
             history = history.at[-1].add(1.0)
         if plastic:

@@ -6,10 +6,20 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
+from jaxphys.gaussians.mesh import write_triangles
 from jaxphys.gaussians.ply import read_ply, write_ply
 from jaxphys.mpm.loop.status import SimulationError
 from jaxphys.pipeline.animate import animate
-from jaxphys.scene import Domain, Filling, Ground, Object, Plane, Scene, read_scene
+from jaxphys.scene import (
+    Domain,
+    Filling,
+    Ground,
+    MeshObstacle,
+    Object,
+    Plane,
+    Scene,
+    read_scene,
+)
 
 FILES = ("config.json", "gaussians.ply", "motion.mp4", "metrics.jsonl", "contact_sheet.png")
 
@@ -155,3 +165,25 @@ def test_two_objects_of_two_materials(tmp_path):
     assert (out / "gaussians_1.ply").exists()
     again = animate(read_scene(out / "config.json").scene, tmp_path / "again", beside=out)
     assert contents(again) == contents(out)
+
+
+def test_a_mesh_that_stands_in_the_way_is_kept_with_the_run(tmp_path):
+    """And shown, where the scene does not hide it."""
+    x = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])[[[0, 2, 1], [0, 3, 2]]] - 0.5
+    lower = np.concatenate([x, np.full((2, 3, 1), -0.5)], -1)
+    half = np.concatenate([lower, np.roll(lower, 1, -1), np.roll(lower, 2, -1)])
+    write_triangles(tmp_path / "rock.ply", np.concatenate([half, -half[:, ::-1]]))
+    rock = MeshObstacle((0.5, 0.5, 0.1), "rock.ply", 0.25, resolution=8)
+    scene = small_scene(frames=1, boundaries=(*small_scene().boundaries, rock))
+    out = animate(scene, tmp_path / "one", objects=(sphere(),), beside=tmp_path)
+    written = read_scene(out / "config.json").scene
+    assert written.boundaries[1].source == "obstacle_1.ply"
+    again = animate(written, tmp_path / "two", beside=out)
+    for name in (*FILES, "obstacle_1.ply"):
+        assert (out / name).read_bytes() == (again / name).read_bytes(), name
+    hidden = dataclasses.replace(scene, obstacle_colour=None)
+    bare = animate(hidden, tmp_path / "three", objects=(sphere(),), beside=tmp_path)
+    picture = "contact_sheet.png"
+    assert (bare / picture).read_bytes() != (out / picture).read_bytes()
+    with pytest.raises(InputError, match=r"boundaries\[1\].source: .*rock.ply: no such file"):
+        animate(scene, tmp_path / "four", objects=(sphere(),))

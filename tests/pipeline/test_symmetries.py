@@ -16,6 +16,7 @@ from jaxphys.mpm.materials.catalogue import MATERIALS
 from jaxphys.pipeline.frames import simulate
 from jaxphys.scene import Domain, Filling, Object, Plane, Rotation, Scene
 from jaxphys.scene.build import build
+from tests.mpm.cases import KINDS
 
 SPACING = 1 / 12
 SIDE = 15 * SPACING
@@ -132,7 +133,9 @@ def known():
     return motion
 
 
-every_material = pytest.mark.parametrize("material", MATERIALS)
+every_material = pytest.mark.parametrize(
+    "material", [m if m in KINDS else pytest.param(m, marks=pytest.mark.slow) for m in MATERIALS]
+)
 SOFT = ("jelly", "sand")
 some_materials = pytest.mark.parametrize(
     "material", [m if m in SOFT else pytest.param(m, marks=pytest.mark.slow) for m in MATERIALS]

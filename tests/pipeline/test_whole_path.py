@@ -150,7 +150,7 @@ def test_with_reaches_every_number(filled):
         ({"density": 0.0}, "must be > 0"),
         ({"youngs_modulus": np.ones(3)}, "give a number or"),
         ({"velocity": np.ones(4)}, "velocity has shape"),
-        ({"velocity": (np.inf, 0.0, 0.0)}, "not finite"),
+        ({"velocity": (np.inf, 0.0, 0.0)}, "not a finite number"),
         ({"gravity": 9.81}, "gravity has shape"),
         ({"friction": 0.3}, "no boundary here has friction"),
     ],

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from jaxphys.mpm.stepping.bounds import largest_stable_dt
+from jaxphys.mpm.transfer import AFLIP, FLIP, Transfer
 from jaxphys.problems.bar import Bar, free_bar, held_bar, line_room
 from jaxphys.problems.column import Column, sudden_column
 from jaxphys.problems.cube import Cube, cube_room, free_cube
@@ -142,6 +143,24 @@ def test_column_is_the_sum_of_its_modes():
 def test_free_bar_is_second_order():
     errors, order = fit(lambda n: free_bar(Bar(), n, room=LINE), BARS, [1 / n for n in BARS])
     assert abs(order - 2) < 0.05, (errors, order)
+
+
+@pytest.mark.parametrize(
+    "transfer",
+    [
+        Transfer(kernel="cubic"),
+        pytest.param(Transfer(FLIP(1.0)), marks=pytest.mark.slow),
+        pytest.param(Transfer(AFLIP(0.99)), marks=pytest.mark.slow),
+        pytest.param(Transfer(AFLIP(1.0), "cubic"), marks=pytest.mark.slow),
+    ],
+    ids=repr,
+)
+def test_free_bar_is_second_order_with_other_transfers(transfer):
+    room = line_room(64, transfer=transfer)
+    errors, order = fit(
+        lambda n: free_bar(Bar(), n, room=room, transfer=transfer), BARS, [1 / n for n in BARS]
+    )
+    assert abs(order - 2) < 0.1, (errors, order)
 
 
 def test_free_bar_order_sees_a_modulus_wrong_by_two_per_cent():

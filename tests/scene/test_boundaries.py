@@ -9,6 +9,7 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
+from jaxphys.gaussians.mesh import write_triangles
 from jaxphys.mpm.boundaries import AnyBoundary
 from jaxphys.mpm.loop.rollout import step
 from jaxphys.scene import Domain, Object, Scene, scene_from_json, to_json
@@ -20,13 +21,24 @@ P_WAVE = YOUNG * (1 - POISSON) / ((1 + POISSON) * (1 - 2 * POISSON))
 BOX = {"centre": [0.5, 0.5, 0.4], "half_size": [0.2, 0.2, 0.11]}
 
 
-def after_a_step(*boundaries, **fields):
+@pytest.fixture(scope="module", autouse=True)
+def cube(tmp_path_factory):
+    """The mesh that a case names."""
+    x = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])[[[0, 2, 1], [0, 3, 2]]] - 0.5
+    lower = np.concatenate([x, np.full((2, 3, 1), -0.5)], -1)
+    half = np.concatenate([lower, np.roll(lower, 1, -1), np.roll(lower, 2, -1)])
+    path = tmp_path_factory.mktemp("mesh") / "cube.ply"
+    write_triangles(path, np.concatenate([half, -half[:, ::-1]]))
+    CASES["mesh"][0]["source"] = str(path)
+
+
+def after_a_step(*boundaries, filling=None, **fields):
     """Rest positions, masses, volumes, velocities (N, 3) after one step, and its length."""
     thing = Object(
         size=0.3,
         centre=(0.5, 0.5, 0.5),
         velocity=tuple(V0),
-        filling=None,
+        filling=filling,
         parameters={"youngs_modulus": YOUNG, "poisson_ratio": POISSON},
     )
     scene = Scene(
@@ -40,6 +52,9 @@ def after_a_step(*boundaries, **fields):
     x, v = (np.asarray(a, np.float64).T for a in (made.state.position, end.velocity))
     mass, volume = (np.asarray(a, np.float64) for a in (made.model.mass, made.model.volume))
     return x, mass, volume, v, made.dt
+
+
+UNSAID = ("acts_on", "particle_radius", "size")  # of every contact, and what Walls derive
 
 
 def in_box(x):
@@ -80,6 +95,57 @@ def check_rough_plane(x, mass, volume, v, dt):
 
 def check_box(x, mass, volume, v, dt):
     np.testing.assert_allclose(v, np.tile([0.1, 0.2, 0.3], (len(v), 1)), atol=1e-6)
+
+
+def check_ball(x, mass, volume, v, dt):
+    arm = x - [0.5, 0.5, 0.17]
+    distance = np.linalg.norm(arm, axis=1)
+    force = pushed(x, volume, distance - 0.2) @ (arm / distance[:, None])
+    assert np.linalg.norm(force) > 0.02
+    np.testing.assert_allclose(mass @ v, mass.sum() * V0 + dt * force, rtol=1e-4)
+
+
+def in_turned_axes(x):
+    """Places about (0.5, 0.5, 0.22) in axes turned by 0.4 about y."""
+    c, s = np.cos(0.4), np.sin(0.4)
+    axes = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])  # rows
+    return (x - [0.5, 0.5, 0.22]) @ axes.T, axes
+
+
+def check_cuboid(x, mass, volume, v, dt):
+    """The upper face alone is near."""
+    own, axes = in_turned_axes(x)
+    force = pushed(x, volume, own[:, 2] - 0.1).sum() * axes[2]
+    assert np.linalg.norm(force) > 0.02
+    np.testing.assert_allclose(mass @ v, mass.sum() * V0 + dt * force, rtol=1e-4, atol=1e-6)
+
+
+def check_cylinder(x, mass, volume, v, dt):
+    """From inside: the lower end and the wall."""
+    own = x - [0.5, 0.5, 0.5]
+    across = np.linalg.norm(own[:, :2], axis=1)
+    force = np.zeros(3)
+    force[2] = pushed(x, volume, 0.12 + own[:, 2]).sum() - pushed(x, volume, 0.12 - own[:, 2]).sum()
+    force[:2] = -pushed(x, volume, 0.18 - across) @ (own[:, :2] / across[:, None])
+    assert np.all(np.abs(force) > 1e-3)
+    np.testing.assert_allclose(mass @ v, mass.sum() * V0 + dt * force, rtol=1e-4)
+
+
+def check_capsule(x, mass, volume, v, dt):
+    arm = x - [0.5, 0.5, 0.27]
+    arm[:, 0] -= np.clip(arm[:, 0], -0.2, 0.2)
+    distance = np.linalg.norm(arm, axis=1)
+    force = pushed(x, volume, distance - 0.1) @ (arm / distance[:, None])
+    assert np.linalg.norm(force) > 0.02
+    np.testing.assert_allclose(mass @ v, mass.sum() * V0 + dt * force, rtol=1e-4)
+
+
+def check_mesh(x, mass, volume, v, dt):
+    """A cube of 0.6 m, 0.02 m below the middle of the body, once its file is read."""
+    force = pushed(x, volume, x[:, 2] - 0.37).sum()
+    assert force > 0.02
+    expected = mass.sum() * V0 + [0, 0, dt * force]
+    np.testing.assert_allclose(mass @ v, expected, rtol=1e-4)
 
 
 def check_impulse(x, mass, volume, v, dt):
@@ -127,6 +193,27 @@ CASES = {
         {"centre": [0.5, 0.5, 0.5], "half_size": [2, 2, 2], "velocity": [0.1, 0.2, 0.3]},
         check_box,
     ),
+    "ball": ({"centre": [0.5, 0.5, 0.17], "radius": 0.2, "friction": 0}, check_ball),
+    "cuboid": (
+        {"centre": [0.5, 0.5, 0.22], "half_size": [0.5, 0.5, 0.1], "friction": 0,
+         "orientation": [np.cos(0.2), 0, np.sin(0.2), 0]},
+        check_cuboid,
+    ),
+    "cylinder": (
+        {"centre": [0.5, 0.5, 0.5], "radius": 0.18, "half_height": 0.12, "inside": True,
+         "friction": 0},
+        check_cylinder,
+    ),
+    "capsule": (
+        {"centre": [0.5, 0.5, 0.27], "radius": 0.1, "half_height": 0.2, "friction": 0,
+         "orientation": [1, 0, 1, 0], "end": 9},
+        check_capsule,
+    ),
+    "mesh": (
+        {"centre": [0.5, 0.5, 0.07], "source": "CUBE", "size": 0.6, "resolution": 13,
+         "friction": 0},
+        check_mesh,
+    ),
     "impulse": (BOX | {"force": [1, 2, 3]}, check_impulse),
     "translate": (BOX | {"velocity": [0.1, 0.2, 0.3]}, check_translate),
     "rotate": (
@@ -171,14 +258,27 @@ def test_every_field_has_a_default_or_a_meaning_and_goes_through_json(kind):
     assert all(not isinstance(value, dict) for value in written["boundaries"][0].values())
     documented = kind.__doc__.split("Attributes:")[1]
     for entry in dataclasses.fields(kind):
-        assert entry.name in documented or entry.name in ("acts_on", "radius", "size"), entry.name
+        assert entry.name in documented or entry.name in UNSAID, entry.name
 
 
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
         ({"type": "plane", "normal": [0, 0, 0]}, r"boundaries\[0\].normal: is zero"),
-        ({"type": "plane", "radius": [1]}, "unknown key 'radius'"),
+        ({"type": "plane", "particle_radius": [1]}, "unknown key 'particle_radius'"),
+        ({"type": "ball", "centre": [0.5, 0.5, 0.5], "radius": 0}, r"boundaries\[0\].radius"),
+        (
+            {"type": "ball", "centre": [0, 0, 0], "radius": 1, "motion": {"type": "keyframe"}},
+            r"boundaries\[0\].motion.type: unknown type 'keyframe'; did you mean 'keyframes'",
+        ),
+        (
+            {"type": "ball", "centre": [0.5, 0.5, 0.5], "radius": 0.2},
+            r"boundaries\[0\].centre: \d+ particles start inside",
+        ),
+        (
+            {"type": "mesh", "centre": [0, 0, 0], "size": 1, "source": "no.obj"},
+            r"boundaries\[0\].source: no.obj: no such file",
+        ),
         ({"type": "walls", "inset": -1}, r"boundaries\[0\].inset"),
         ({"type": "plane", "point": [0, 0, 0.5]}, r"boundaries\[0\].point: \d+ particles start"),
     ],

@@ -1,15 +1,24 @@
+from dataclasses import replace
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.program import parts
 from jaxphys.gaussians.gaussians import covariances, from_points
-from jaxphys.mpm.loop.frames import rollout_frames
+from jaxphys.mpm.boundaries import Plane
+from jaxphys.mpm.loop.frames import advance_frame, rollout_frames
+from jaxphys.mpm.loop.rollout import step
+from jaxphys.mpm.stepping import Adaptive, Fixed
+from jaxphys.mpm.transfer import AFLIP, APIC, FLIP, Transfer
 from jaxphys.pipeline.draw import draw
 from jaxphys.render.camera import orbit
 from jaxphys.scene import Domain, Object, Region, Rotation, Scene
 from jaxphys.scene.build import build
+from jaxphys.scene.json import scene_from_json, to_json
 
 POINTS = np.random.default_rng(0).uniform(-1, 1, (60, 3)).astype(np.float32)
 POINTS[0], POINTS[1] = (-2, 0, 0), (2, 0, 0)
@@ -74,9 +83,85 @@ def test_only_what_is_inside_the_area_moves():
     assert look.gaussians.count == (POINTS[:, 0] < 0).sum()
 
 
+def test_a_transfer_goes_from_json_into_the_step():
+    asked = {"scheme": {"type": "flip", "blend": 0.9}, "kernel": "cubic"}
+    read = scene_from_json(to_json(scene()) | {"transfer": asked})
+    assert read.transfer == Transfer(FLIP(0.9), "cubic") and to_json(read)["transfer"] == asked
+    simulation, _ = build(read, GAUSSIANS)
+    config, model, state = simulation.config, simulation.model, simulation.state
+    assert config.transfer == read.transfer
+    assert "velocity of its own" in parts(lambda: step(config, model, state, simulation.dt))
+    end = advance_frame(config, model, state, simulation.dt, 2)
+    assert int(end.status.code) == 0 and int(end.status.taken) == 2
+    # A longer swing of a particle alone: 2 / sqrt(3) of the step of quadratic splines for APIC, and
+    # without an affine part 1 / sqrt(2) of that.
+    plain = build(scene(), GAUSSIANS).simulation
+    assert plain.config.transfer == Transfer(APIC(), "quadratic")
+    assert plain.steps < simulation.steps < 1.5 * plain.steps
+
+
+@pytest.mark.parametrize(
+    ("transfer", "message"),
+    [
+        ({"scheme": {"type": "flup"}}, r"transfer\.scheme\.type: unknown type 'flup'.*flip"),
+        ({"scheme": {"blend": 0.5}}, r"transfer\.scheme: .*aflip, apic, flip, pic"),
+        ({"scheme": {"type": "flip", "blend": 1.5}}, r"transfer\.scheme\.blend: .* at most 1"),
+        ({"scheme": {"type": "apic", "blend": 0.5}}, r"transfer\.scheme: unknown key 'blend'"),
+        ({"kernel": "linear"}, r"transfer\.kernel: unknown value 'linear'.*quadratic"),
+    ],
+)
+def test_wrong_transfers_are_named(transfer, message):
+    with pytest.raises(InputError, match=message):
+        scene_from_json(to_json(scene()) | {"transfer": transfer})
+
+
+def test_cubic_splines_need_more_room_at_the_ends():
+    near = scene(centre=(0.35, 0.5, 0.5))  # reaches to 0.15 m, where 1.5 cells are 0.125
+    build(near, GAUSSIANS)
+    with pytest.raises(InputError, match="the domain holds"):
+        build(replace(near, transfer=Transfer(AFLIP(), "cubic")), GAUSSIANS)
+
+
 def test_substep_divides_the_frame():
     simulation, _ = build(scene(), GAUSSIANS)
     assert simulation.steps * simulation.dt == pytest.approx(0.01)
+
+
+def test_float64_goes_all_the_way():
+    """From the scene to the last frame where JAX is set to it, and nowhere through float32."""
+    thing = {"velocity": (0.1, 0.2, -0.7), "spin": (0.0, 0.0, 0.3), "parameters": {"density": 0.1}}
+    asked = replace(scene(**thing), boundaries=(Plane((0.5, 0.5, 0.1), friction=0.3),), damping=0.1)
+    for dtype, wanted in ((None, jnp.float64), ("float32", jnp.float32)):
+        simulation, _ = build(asked, GAUSSIANS, dtype=dtype)
+        numbers = (simulation.model, simulation.state)
+        kinds = {leaf.dtype for leaf in jax.tree.leaves(numbers) if leaf.dtype.kind == "f"}
+        assert kinds == {jnp.dtype(wanted)}
+        motion = jax.eval_shape(partial(rollout_frames, frames=2), simulation)
+        assert motion.position.dtype == motion.time.dtype == wanted
+        adapting = replace(simulation, stepping=Adaptive())
+        motion = jax.eval_shape(partial(rollout_frames, frames=2), adapting)
+        assert motion.position.dtype == motion.time.dtype == wanted
+    simulation = build(asked, GAUSSIANS).simulation.with_(poisson_ratio=0.2)
+    model, x, v = simulation.model, simulation.state.position, simulation.state.velocity
+    # What float32 would round at the seventh digit.
+    np.testing.assert_allclose(model.mass / model.volume, 0.1, rtol=1e-14)
+    np.testing.assert_allclose(v[0], 0.1 - 0.3 * (x[1] - 0.5), rtol=1e-13)
+    np.testing.assert_allclose(model.parameters["poisson_ratio"], 0.2, rtol=1e-15)
+    assert float(model.boundaries[0].friction) == 0.3 and float(model.boundaries[1].rate) == 0.1
+
+
+def test_a_scene_says_how_it_is_stepped():
+    """Films adapt where nothing else is said; a given substep is a fixed one."""
+    assert build(scene(), GAUSSIANS).simulation.stepping == Fixed()
+    assert scene().filmed().stepping == Adaptive()
+    assert build(scene().filmed(), GAUSSIANS).simulation.stepping == Adaptive()
+    assert replace(scene(), substep=1e-4).filmed().stepping == Fixed()
+    fixed = replace(scene(), stepping=Fixed())
+    assert fixed.filmed() == fixed
+    with pytest.raises(InputError, match=r"substep: .* fixed"):
+        replace(scene(), stepping=Adaptive(), substep=1e-4)
+    with pytest.raises(InputError, match="every: 0 must be at least 1"):
+        Adaptive(every=0)
 
 
 def test_unknown_parameter_of_with():

@@ -5,6 +5,7 @@ import typing
 import pytest
 
 from jaxphys.core.errors import InputError
+from jaxphys.mpm.stepping import Adaptive, Fixed
 from jaxphys.scene import (
     Box,
     Cut,
@@ -50,6 +51,7 @@ FULL = Scene(
         Cut(UNIT, UNIT),
     ),
     camera=View(target=UNIT, distance=3.0),
+    stepping=Fixed(),
     substep=1e-3,
 )
 
@@ -68,9 +70,19 @@ def test_every_field_is_written_and_defaults_are_read():
     assert scene_from_json({}) == Scene() == scene_from_json(written)
 
 
+def test_a_stepping_is_read_by_its_type():
+    read = scene_from_json({"stepping": {"type": "adaptive", "every": 4, "safety": 0.7}})
+    assert read.stepping == Adaptive(every=4, safety=0.7)
+    assert scene_from_json(to_json(read)) == read
+    assert scene_from_json({"stepping": {"type": "fixed"}}).stepping == Fixed()
+
+
 @pytest.mark.parametrize(
     ("value", "words"),
     [
+        ({"stepping": {"type": "adaptiv"}}, ["scene.stepping.type", "did you mean 'adaptive'"]),
+        ({"stepping": {"type": "fixed", "every": 2}}, ["scene.stepping", "'every'"]),
+        ({"stepping": {"type": "adaptive", "safety": 0}}, ["safety", "above 0"]),
         ({"gravty": [0, 0, 0]}, ["scene", "'gravty'", "did you mean 'gravity'"]),
         ({"gravity": [0, 0]}, ["scene.gravity", "3 values"]),
         ({"gravity": "down"}, ["scene.gravity", "list"]),

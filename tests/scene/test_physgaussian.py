@@ -8,6 +8,7 @@ import pytest
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.boundaries import Setting
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.materials.catalogue import get_material
 from jaxphys.scene import Box, Impulse, Plane, Release, Rotate, Translate, Walls, read_scene
 from jaxphys.scene.physgaussian import from_physgaussian
 
@@ -165,12 +166,14 @@ def test_surfaces_are_honoured_not_copied():
 
 @pytest.mark.parametrize(
     ("material", "ours"), [("jelly", "jelly"), ("metal", "metal"), ("sand", "sand"),
-                           ("foam", "metal"), ("plasticine", "metal"), ("snow", "sand")]
+                           ("foam", "plasticine"), ("plasticine", "plasticine"), ("snow", "snow")]
 )  # fmt: skip
 def test_materials(material, ours):
     loaded = from_physgaussian({"material": material, "g": [0, 0, 0], "yield_stress": 1e4})
     assert loaded.scene.objects[0].material == ours
-    assert (material == ours) != any(note.startswith("material:") for note in loaded.notes)
+    # Its snow has no stress at all, and its foam is what is called plasticine here.
+    noted = any(note.startswith("material:") for note in loaded.notes)
+    assert noted == (material in ("foam", "snow"))
 
 
 @pytest.mark.parametrize(
@@ -206,6 +209,33 @@ def test_file_is_recognised(tmp_path):
     (tmp_path / "ficus.json").write_text(json.dumps(FICUS))
     loaded = read_scene(tmp_path / "ficus.json")
     assert loaded.notes and loaded.scene.frames == 125
+
+
+def test_foam_is_their_viscoplastic_law():
+    """Theirs: |s| = |s_tr| - (|s_tr| - sqrt(2/3) yield) / (1 + plastic_viscosity / (2 mu dt))."""
+    theirs = {"material": "foam", "g": [0, 0, 0], "E": 2.6e5, "nu": 0.3}
+    theirs |= {"yield_stress": 1e3, "plastic_viscosity": 40.0}
+    loaded = from_physgaussian(theirs)
+    thing = loaded.scene.objects[0]
+    mu, dt, e = 1e5, 1e-4, 0.05
+    law = get_material(thing.material).law
+    values = law.prepare({name: jnp.full(1, thing.parameters[name]) for name in law.parameters})
+    F = jnp.asarray(np.diag([np.exp(e), np.exp(-e), 1.0]))[..., None]
+    _, tau, _ = law.update(values, F, jnp.zeros((0, 1)), dt)
+    trial = 2 * mu * e * np.sqrt(2)
+    expected = trial - (trial - np.sqrt(2 / 3) * 1e3) / (1 + 40.0 / (2 * mu * dt))
+    assert float(jnp.sqrt(jnp.sum(tau**2))) == pytest.approx(expected, rel=1e-9)
+    assert not any("plastic_viscosity" in note for note in loaded.notes)
+
+
+def test_plasticine_is_perfectly_plastic_and_says_what_is_left_out():
+    theirs = {"material": "plasticine", "g": [0, 0, 0], "yield_stress": 1e3}
+    loaded = from_physgaussian(theirs | {"plastic_viscosity": 5.0, "softening": 3.0})
+    parameters = loaded.scene.objects[0].parameters
+    assert parameters["yield_stress"] == pytest.approx(1e3 * 1.5**0.5)
+    assert parameters["plastic_viscosity"] == 0
+    text = "\n".join(loaded.notes)
+    assert "plastic_viscosity: left out" in text and "softening: left out" in text
 
 
 def test_their_yield_stress_is_a_radius_and_their_hardening_grows_it():

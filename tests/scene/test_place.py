@@ -9,6 +9,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import Gaussians, concatenate, from_points, to_splats
 from jaxphys.gaussians.surface import gaussians_from_mesh
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.transfer.kernels import QUADRATIC
 from jaxphys.render.camera import orbit, position
 from jaxphys.render.renderer import render
 from jaxphys.scene.build import build
@@ -30,7 +31,9 @@ def cone(count=2000) -> Gaussians:
 
 
 def put(thing, gaussians=None):
-    return place(cone() if gaussians is None else gaussians, thing, GRID, "objects[0]", 0)
+    return place(
+        cone() if gaussians is None else gaussians, thing, GRID, QUADRATIC, "objects[0]", 0
+    )
 
 
 def volume_of(placed):

@@ -6,6 +6,7 @@ differentiated, its static fields choose the code. It acts by overriding one or 
 stages of a step; a stage that it does not act in is not traced.
 """
 
+from collections.abc import Mapping
 from dataclasses import Field, dataclass, fields, replace
 from typing import Any, ClassVar, Self, cast
 
@@ -27,7 +28,7 @@ from jaxphys.core.fields import (
     vector,
 )
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.state import Model
+from jaxphys.mpm.state import Model, RigidBody
 
 Vector = tuple[float, float, float]
 Coordinates = tuple[Array, Array, Array]
@@ -55,45 +56,55 @@ class Setting:
 
     Attributes:
         grid: of the solver.
-        rest: positions of all particles at time 0 (N, 3) [m].
+        rest: positions of all particles at time 0 (N, 3) [m], known or traced.
         volume: of the particles at rest (N,) [m^3].
         dtype: of the simulation.
     """
 
     grid: Grid
-    rest: np.ndarray
-    volume: np.ndarray
+    rest: np.ndarray | Array
+    volume: np.ndarray | Array
     dtype: np.dtype
 
-    def in_box(self, centre: Vector, half_size: Vector) -> np.ndarray:
-        """Which particles start inside a box, (N,); those on its faces do not."""
-        reach = np.asarray(half_size) - ON_EDGE * self.grid.spacing
-        offset = np.abs(np.asarray(self.rest, np.float64) - np.asarray(centre))
-        return np.all(offset < reach, axis=1)
+    def in_box(self, centre: Array, half_size: Array) -> Array:
+        """Which particles start inside a box, (N,) bool; those on its faces do not."""
+        reach = half_size - ON_EDGE * self.grid.spacing
+        return jnp.all(jnp.abs(self.rest - centre) < reach, axis=1)
 
 
-class Boundary(Checked):
-    """Base of all boundaries. Subclasses are frozen dataclasses and pytrees, with a `type`."""
+class Numbers(Checked):
+    """Base of what is declared with plain numbers and then holds arrays. Subclasses are frozen
+    dataclasses and pytrees, with a `type`.
+    """
 
     __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
     type: ClassVar[str]
 
     def prepared(self, setting: Setting) -> Self:
-        """The same boundary with its numbers as arrays, and with what it precomputes.
+        """The same with its numbers as arrays, and with what it precomputes.
 
         Raises:
             InputError: naming the field that cannot be used.
         """
-        changes = {}
+        changes: dict[str, Any] = {}
         for entry in fields(self):
             value = getattr(self, entry.name)
-            if value is not None and not ({"static", "keys"} & set(entry.metadata)):
-                changes[entry.name] = jnp.asarray(value, setting.dtype)
-                self._check_shape(entry, changes[entry.name])
-        return replace(self, **changes)
+            if value is None or {"static", "keys"} & set(entry.metadata):
+                continue
+            if isinstance(value, Numbers):
+                changes[entry.name] = value.prepared(setting)
+                continue
+            changes[entry.name] = jnp.asarray(value, setting.dtype)
+            self._check_shape(entry, changes[entry.name])
+        return replace(self, **changes).derived(setting)
+
+    def derived(self, setting: Setting) -> Self:
+        """The same, prepared, with what it derives from where the particles start."""
+        return self
 
     def changed(self, **values) -> Self:
-        """A prepared boundary with other numbers, which may be traced and differentiated.
+        """The same, prepared, with other numbers, which may be traced and differentiated; those of
+        a part are given by name, such as `motion={"velocity": ...}`.
 
         Raises:
             InputError: a field that does not exist, chooses code, or is left out of the program; a
@@ -104,7 +115,7 @@ class Boundary(Checked):
             for entry in fields(self)
             if not entry.metadata.get("static") and entry.metadata.get("keys") != ()
         }
-        arrays = {}
+        made: dict[str, Any] = {}
         for name, value in values.items():
             if name not in numbers:
                 raise InputError(f"{name}: is no number of a {self.type}; {nearest(name, numbers)}")
@@ -114,14 +125,11 @@ class Boundary(Checked):
                     f"{name}: was built as zero or none, which leaves it out of the program; build "
                     "the scene with another one to change it"
                 )
-            if not isinstance(value, jax.core.Tracer):
-                known = np.asarray(value, np.float64)
-                plain = tuple(known.tolist()) if known.ndim else float(known)
-                check_value(name, plain, numbers[name].metadata)
-            arrays[name] = jnp.asarray(value, now.dtype)
-            if arrays[name].shape != now.shape:
-                raise InputError(f"{name}: has shape {arrays[name].shape}; give {now.shape}")
-        return replace(self, **arrays)
+            if isinstance(now, Numbers):
+                made[name] = _changed_part(name, now, value)
+                continue
+            made[name] = changed_number(name, now, value, numbers[name].metadata)
+        return replace(self, **made)
 
     @staticmethod
     def _check_shape(entry, value: Array) -> None:
@@ -130,9 +138,48 @@ class Boundary(Checked):
             wanted = f"{shape[0]} numbers" if shape else "one number"
             raise InputError(f"{entry.name}: expected {wanted}, got shape {value.shape}")
 
+
+def _changed_part(name: str, part: Numbers, values: Any) -> Numbers:
+    if not isinstance(values, Mapping):
+        raise InputError(
+            f'{name}: give its numbers by name, such as {{"{fields(part)[0].name}": 0}}'
+        )
+    try:
+        return part.changed(**values)
+    except InputError as error:
+        raise InputError(f"{name}.{error}") from None
+
+
+def plain(array: np.ndarray) -> Any:
+    """An array as nested tuples of numbers."""
+    return tuple(map(plain, array)) if array.ndim else float(array)
+
+
+class Boundary(Numbers):
+    """Base of all boundaries."""
+
+    regions: ClassVar[tuple[str, ...]] = ()  # fields that say which particles it acts on
+
     def acts_in(self, stage: str) -> bool:
         """Whether a step calls the method called `stage`."""
         return getattr(type(self), stage) is not getattr(Boundary, stage)
+
+    @property
+    def rough(self) -> bool:
+        """Whether it has friction."""
+        return False
+
+    @property
+    def free(self) -> bool:
+        """Whether it is a rigid body that is pushed back."""
+        return False
+
+    def body(self, boundaries: "tuple[Boundary, ...]") -> RigidBody:
+        """A free one at time 0, among these prepared boundaries."""
+        raise NotImplementedError
+
+    def check_start(self, setting: Setting) -> None:
+        """Raises `InputError` where particles start that must not."""
 
     @property
     def rows(self) -> int:
@@ -145,6 +192,10 @@ class Boundary(Checked):
         Alone, they are stable for dt < 2 / sqrt(this).
         """
         return jnp.zeros((), model.mass.dtype)
+
+    def fastest(self, begin: Array | float = 0.0, end: Array | float = FOREVER) -> Array:
+        """Largest speed [m/s], (), that it gives to matter while begin <= time < end [s]."""
+        return jnp.zeros(())
 
     def loads(self, model: Model, grid: Grid) -> dict[str, Array]:
         """What it must know of every particle, arrays (N,): made once for many steps, of all
@@ -166,10 +217,14 @@ class Boundary(Checked):
         loads: dict[str, Array],
         time: Array,
         dt: Array,
+        since: Array,
     ) -> tuple[Array, Array | None]:
         """Momentum (3, N) [kg m/s] to be added to what the particles give to the grid, and its rows
         of `State.slip` afterwards. Position [m] and velocity [m/s] are (3, N); loads as `loads`
         makes them, of these particles. A load of zero must mean no momentum.
+
+        dt: of the step from `time` on, in which the momentum acts; since: of the one before, in
+        which the particles moved by `since` times their velocity; () [s] each.
         """
         raise NotImplementedError
 
@@ -186,7 +241,18 @@ class Boundary(Checked):
         raise NotImplementedError
 
 
-def array_of(value: Vector | float | Array | None) -> Array:
+def changed_number(name: str, now: Array, value: Any, rules: Mapping[str, Any]) -> Array:
+    """`value` in place of the number `now`, checked by the rules of its field where it is known."""
+    if not isinstance(value, jax.core.Tracer):
+        known = np.asarray(value, np.float64)
+        check_value(name, plain(known), rules)
+    array = jnp.asarray(value, now.dtype)
+    if array.shape != now.shape:
+        raise InputError(f"{name}: has shape {array.shape}; give {now.shape}")
+    return array
+
+
+def array_of(value: tuple | float | Array | None) -> Array:
     """A number of a prepared boundary: declared as plain one or derived, it is an array by now."""
     return cast(Array, value)
 
@@ -194,6 +260,11 @@ def array_of(value: Vector | float | Array | None) -> Array:
 def active(time: Array, start: Array | float, end: Array | float) -> Array:
     """Whether start <= time < end, shape ()."""
     return (time >= start) & (time < end)
+
+
+def speed_within(speed: Array, begin: Array, end: Array, start, stop) -> Array:
+    """`speed`, () [m/s], if start <= time < stop meets begin <= time < end, else 0."""
+    return jnp.where((start < end) & (stop > begin), speed, 0)
 
 
 def column(vector: Array, like) -> Array:

@@ -20,6 +20,7 @@ from jaxphys.mpm.boundaries.base import (
     active,
     array_of,
     column,
+    speed_within,
 )
 from jaxphys.mpm.boundaries.contact import FAR, Contact, Face, Surface
 
@@ -54,6 +55,10 @@ class Box(Contact):
     def kinds(self):
         return ((self.surface, self.friction is not None),)
 
+    def fastest(self, begin=0.0, end=FOREVER):
+        speed = jnp.sqrt(jnp.sum(array_of(self.velocity) ** 2))
+        return speed_within(speed, begin, end, self.start, self.end)
+
     def faces(self, x, time: Array) -> tuple[Face, ...]:
         moved = array_of(self.velocity) * jnp.clip(time - self.start, 0, self.end - self.start)
         velocity = jnp.where(active(time, self.start, self.end), array_of(self.velocity), 0)
@@ -69,14 +74,24 @@ def box_distance(offset, half_size: Array) -> tuple[Array, Array]:
     offset: from its centre, (3, ...) or three arrays that broadcast [m]. Outside, the direction is
     that from the nearest point; inside, that of the nearest face.
     """
-    beyond = jnp.stack(jnp.broadcast_arrays(*(jnp.abs(offset[i]) - half_size[i] for i in range(3))))
+    distance, shares = corner_distance([jnp.abs(offset[i]) - half_size[i] for i in range(3)])
+    sign = jnp.stack([jnp.broadcast_to(jnp.sign(offset[i]), distance.shape) for i in range(3)])
+    return distance, sign * shares
+
+
+def corner_distance(beyond) -> tuple[Array, Array]:
+    """Signed distance (...) of the solid that faces at right angles to each other enclose, and how
+    much of the direction away from it is along the normal of each, (K, ...).
+
+    beyond: K signed distances of the faces, which broadcast [m].
+    """
+    beyond = jnp.stack(jnp.broadcast_arrays(*beyond))
     out = jnp.maximum(beyond, 0)
     squared = jnp.sum(out**2, axis=0)
     outside = squared > 0
     length = jnp.sqrt(jnp.where(outside, squared, 1))
     nearest = jnp.max(beyond, axis=0)
     # Of several that are as near, the first: the others' share would make the direction longer.
-    face = jnp.arange(3).reshape(3, *(1,) * nearest.ndim) == jnp.argmax(beyond, axis=0)
-    sign = jnp.stack([jnp.broadcast_to(jnp.sign(offset[i]), nearest.shape) for i in range(3)])
-    normal = sign * jnp.where(outside, out / length, face)
-    return jnp.where(outside, length, nearest), normal
+    rows = jnp.arange(len(beyond)).reshape(-1, *(1,) * nearest.ndim)
+    face = rows == jnp.argmax(beyond, axis=0)
+    return jnp.where(outside, length, nearest), jnp.where(outside, out / length, face)

@@ -6,8 +6,8 @@ from the surface it is pushed out by
 
     f = k (r - d)+,   k = STIFFNESS * M V / h^2
 
-with M its P-wave modulus, V its volume, h the spacing: the acceleration is the same whatever the
-number of particles in a cell, STIFFNESS (c / h)^2 (r - d)+. Friction is a spring of the same k
+with M its wave modulus at rest, V its volume, h the spacing: the acceleration is the same whatever
+the number of particles in a cell, STIFFNESS (c / h)^2 (r - d)+. Friction is a spring of the same k
 along the surface, which gives way where Coulomb's law says so: the elastic part u of the slip, kept
 in `State.slip`, is cut to |u| <= mu (r - d)+. Nothing creeps, nothing depends on dt, and without
 friction energy is conserved. Surfaces that hold also pull, up to a distance of 2 r beyond touch.
@@ -36,7 +36,6 @@ from jaxphys.mpm.boundaries.base import (
     array_of,
 )
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.materials.elasticity import lame
 from jaxphys.mpm.state import Model
 
 Surface = Literal["sticky", "slip", "separate"]
@@ -75,12 +74,14 @@ class Contact(Boundary):
     Attributes:
         acts_on: "particles": by a potential at the particles, exact at any place; "nodes": by
             holding grid nodes inside of the solid. None: particles, but nodes where it is sticky.
-        radius: of the particles [m], (N,).
+        particle_radius: [m], (N,).
     """
 
     place: ClassVar[str]  # the field that an object inside of it should be told to change
     acts_on: ActsOn | None = field(default=None, kw_only=True, metadata=STATIC | one_of(ActsOn))
-    radius: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
+    particle_radius: Array | None = field(
+        default=None, kw_only=True, repr=False, metadata=PER_PARTICLE
+    )
 
     @property
     @abstractmethod
@@ -107,6 +108,10 @@ class Contact(Boundary):
         return stage == ("impulse" if self.at_particles else "on_grid")
 
     @property
+    def rough(self) -> bool:
+        return self.friction is not None
+
+    @property
     def rows(self) -> int:
         if not self.at_particles:
             return 0
@@ -119,7 +124,8 @@ class Contact(Boundary):
             made = replace(made, **_FRICTIONLESS)
         if not made.at_particles:
             return made
-        made = replace(made, radius=jnp.asarray(0.5 * np.cbrt(setting.volume), setting.dtype))
+        radius = jnp.asarray(0.5 * np.cbrt(setting.volume), setting.dtype)
+        made = replace(made, particle_radius=radius)
         made.check_start(setting)
         return made
 
@@ -145,19 +151,19 @@ class Contact(Boundary):
             return {}
         return super().loads(model, grid) | {"stiffness": stiffness(model, grid)}
 
-    def impulse(self, position, velocity, slip, loads, time, dt):
+    def impulse(self, position, velocity, slip, loads, time, dt, since):
         with part("contact"):
-            return self._pushed(position, velocity, slip, loads, time, dt)
+            return self._pushed(position, velocity, slip, loads, time, dt, since)
 
-    def _pushed(self, position, velocity, slip, loads, time, dt):
+    def _pushed(self, position, velocity, slip, loads, time, dt, since):
         total, kept, first = jnp.zeros_like(position), [], 0
         for face in self.faces(position, time):
             moved = None
             if face.keeps_slip:
-                # `slip` is as the step before left it; the particle has moved by dt v since.
-                moved = slip[first : first + 3] + dt * (velocity - face.velocity)
+                # `slip` is as the step before left it; the particle has moved since.
+                moved = slip[first : first + 3] + since * (velocity - face.velocity)
                 first += 3
-            pressed, moved = deflection(face, loads["radius"], moved)
+            pressed, moved = deflection(face, loads["particle_radius"], moved)
             total = total + pressed * face.normal
             if moved is not None:
                 total = total - moved
@@ -174,8 +180,7 @@ class Contact(Boundary):
 
 def stiffness(model: Model, grid: Grid) -> Array:
     """Stiffness of contact at each particle [N/m], (N,)."""
-    mu, lam = lame(model.parameters)
-    return (STIFFNESS / grid.spacing**2) * (lam + 2 * mu) * model.volume
+    return (STIFFNESS / grid.spacing**2) * array_of(model.wave_modulus) * model.volume
 
 
 def deflection(face: Face, radius: Array, slip: Array | None) -> tuple[Array, Array | None]:

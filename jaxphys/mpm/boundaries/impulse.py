@@ -39,6 +39,7 @@ class Impulse(Boundary):
     """
 
     type: ClassVar[str] = "impulse"
+    regions: ClassVar[tuple[str, ...]] = ("centre", "half_size")
     centre: Vector = field(metadata=PLACE)
     half_size: Vector = field(metadata=HALF_SIZE)
     force: Vector = field(metadata=vector(between(-1e15, 1e15), unit("N")))
@@ -47,17 +48,17 @@ class Impulse(Boundary):
     per_particle: bool = field(default=False, metadata=STATIC)
     chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
 
-    def prepared(self, setting: Setting) -> Self:
-        chosen = setting.in_box(self.centre, self.half_size)
-        made = replace(super().prepared(setting), chosen=jnp.asarray(chosen))
-        return replace(made, force=made.force * chosen.sum()) if self.per_particle else made
+    def derived(self, setting: Setting) -> Self:
+        chosen = setting.in_box(array_of(self.centre), array_of(self.half_size))
+        return replace(self, chosen=chosen)
 
     def loads(self, model, grid):
         mass = jnp.where(array_of(self.chosen), model.mass, 0)
         total = jnp.sum(mass)
-        return {"share": mass / jnp.where(total > 0, total, 1)}
+        share = mass / jnp.where(total > 0, total, 1)
+        return {"share": share * jnp.sum(array_of(self.chosen)) if self.per_particle else share}
 
-    def impulse(self, position, velocity, slip, loads, time, dt):
+    def impulse(self, position, velocity, slip, loads, time, dt, since):
         # Of the step only what lies within: a push shorter than a step is no stronger for it.
         end = jnp.minimum(time + dt, self.start + self.duration)
         lasts = jnp.clip(end - jnp.maximum(time, self.start), 0, dt)

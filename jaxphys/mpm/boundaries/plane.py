@@ -20,6 +20,7 @@ from jaxphys.mpm.boundaries.base import (
     array_of,
     column,
     height,
+    speed_within,
     unit_vector,
 )
 from jaxphys.mpm.boundaries.contact import FAR, Contact, Face, Surface
@@ -53,6 +54,10 @@ class Plane(Contact):
     @property
     def kinds(self):
         return ((self.surface, self.friction is not None),)
+
+    def fastest(self, begin=0.0, end=FOREVER):
+        speed = jnp.sqrt(jnp.sum(array_of(self.velocity) ** 2))
+        return speed_within(speed, begin, end, self.start, self.end)
 
     def faces(self, x, time: Array) -> tuple[Face, ...]:
         normal = unit_vector(array_of(self.normal))

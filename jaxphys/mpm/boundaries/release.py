@@ -5,7 +5,6 @@ from typing import ClassVar, Self
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 
 from jaxphys.core.fields import between, unit
@@ -16,6 +15,8 @@ from jaxphys.mpm.boundaries.base import (
     Boundary,
     Setting,
     Vector,
+    array_of,
+    unit_vector,
 )
 
 
@@ -35,6 +36,7 @@ class Release(Boundary):
     """
 
     type: ClassVar[str] = "release"
+    regions: ClassVar[tuple[str, ...]] = ("normal",)
     normal: Vector = field(metadata=DIRECTION)
     begin: float = field(metadata=between(-1e6, 1e6) | unit("m"))
     finish: float = field(metadata=between(-1e6, 1e6) | unit("m"))
@@ -42,10 +44,9 @@ class Release(Boundary):
     end: float = field(default=1.0, metadata=TIME)
     places: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
 
-    def prepared(self, setting: Setting) -> Self:
-        normal = np.asarray(self.normal, np.float64)
-        places = np.asarray(setting.rest, np.float64) @ (normal / np.linalg.norm(normal))
-        return replace(super().prepared(setting), places=jnp.asarray(places, setting.dtype))
+    def derived(self, setting: Setting) -> Self:
+        places = setting.rest @ unit_vector(array_of(self.normal))
+        return replace(self, places=jnp.asarray(places, setting.dtype))
 
     def on_particles(self, position, velocity, loads, time, dt):
         share = jnp.clip((time - self.start) / (self.end - self.start), 0, 1)

@@ -5,7 +5,6 @@ from typing import ClassVar, Self
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 
 from jaxphys.core.fields import between, unit
@@ -22,6 +21,7 @@ from jaxphys.mpm.boundaries.base import (
     Vector,
     active,
     array_of,
+    speed_within,
     unit_vector,
 )
 
@@ -42,6 +42,7 @@ class Rotate(Boundary):
     """
 
     type: ClassVar[str] = "rotate"
+    regions: ClassVar[tuple[str, ...]] = ("point", "axis", "half_height", "radius")
     point: Vector = field(metadata=PLACE)
     axis: Vector = field(metadata=DIRECTION)
     half_height: float = field(metadata=LENGTH)
@@ -52,14 +53,19 @@ class Rotate(Boundary):
     end: float = field(default=FOREVER, metadata=TIME)
     chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
 
-    def prepared(self, setting: Setting) -> Self:
-        axis = np.asarray(self.axis, np.float64)
-        arm = np.asarray(setting.rest, np.float64) - np.asarray(self.point)
-        along = arm @ (axis / np.linalg.norm(axis))
-        across = np.sqrt(np.maximum(np.sum(arm**2, axis=1) - along**2, 0))
+    def derived(self, setting: Setting) -> Self:
+        arm = setting.rest - array_of(self.point)
+        along = arm @ unit_vector(array_of(self.axis))
+        squared = jnp.sum(arm**2, axis=1) - along**2
         edge = ON_EDGE * setting.grid.spacing
-        chosen = (np.abs(along) < self.half_height - edge) & (across < self.radius - edge)
-        return replace(super().prepared(setting), chosen=jnp.asarray(chosen))
+        within = squared < jnp.maximum(self.radius - edge, 0) ** 2
+        return replace(self, chosen=within & (jnp.abs(along) < self.half_height - edge))
+
+    def fastest(self, begin=0.0, end=FOREVER):
+        # Within the cylinder, where the particles start.
+        across = self.radius * self.angular_velocity
+        speed = jnp.sqrt(across**2 + self.axial_velocity**2)
+        return speed_within(speed, begin, end, self.start, self.end)
 
     def on_particles(self, position, velocity, loads, time, dt):
         axis = unit_vector(array_of(self.axis))

@@ -9,6 +9,8 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries.base import Boundary, Setting
 from jaxphys.mpm.boundaries.damping import Damping
+from jaxphys.mpm.boundaries.free import Wrench
+from jaxphys.mpm.boundaries.obstacle import Obstacle
 from jaxphys.mpm.grid import Grid, node_coordinates
 from jaxphys.mpm.state import Model
 
@@ -25,6 +27,12 @@ def prepare(boundaries: Iterable[Boundary], setting: Setting) -> tuple[Boundary,
             made.append(boundary.prepared(setting))
         except InputError as error:
             raise InputError(f"boundaries[{i}].{error}") from None
+    free = [i for i, boundary in enumerate(made) if boundary.free]
+    if len(free) > 1:
+        raise InputError(
+            f"boundaries[{free[1]}].motion: is free, as that of boundaries[{free[0]}]; bodies do "
+            "not feel each other, so that a scene may have one"
+        )
     return tuple(made)
 
 
@@ -53,11 +61,13 @@ def impulses(
     slip: Array | None,
     time: Array,
     dt: Array,
-) -> tuple[Array | None, Array | None]:
+    since: Array,
+) -> tuple[Array | None, Array | None, Wrench | None]:
     """Momentum (3, N) [kg m/s] that the boundaries add to what particles give to the grid, None if
-    none does, and the new `State.slip`.
+    none does, the new `State.slip`, and the share of the free one, None if there is none.
     """
     total: Array | None = None
+    wrench: Wrench | None = None
     kept: list[Array] = []
     first = 0
     for name, index in acting(boundaries, "impulse"):
@@ -65,12 +75,21 @@ def impulses(
         rows = boundary.rows
         own = slip[first : first + rows] if rows and slip is not None else None
         with part(name):
-            given, own = boundary.impulse(position, velocity, own, loads[index], time, dt)
+            given, own = boundary.impulse(position, velocity, own, loads[index], time, dt, since)
             total = given if total is None else total + given
+            if isinstance(boundary, Obstacle) and boundary.free:
+                wrench = boundary.wrench(position, given)
         if rows and own is not None:
             kept.append(own)
             first += rows
-    return total, jnp.concatenate(kept) if kept else slip
+    return total, jnp.concatenate(kept) if kept else slip, wrench
+
+
+def no_wrench(boundaries: tuple[Boundary, ...], dtype) -> Wrench | None:
+    """Of no particles: zero, or None if no boundary is free."""
+    if not any(boundary.free for boundary in boundaries):
+        return None
+    return Wrench(jnp.zeros(3, dtype), jnp.zeros(3, dtype))
 
 
 def on_grid(

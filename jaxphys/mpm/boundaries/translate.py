@@ -19,6 +19,7 @@ from jaxphys.mpm.boundaries.base import (
     Vector,
     active,
     array_of,
+    speed_within,
 )
 
 
@@ -35,6 +36,7 @@ class Translate(Boundary):
     """
 
     type: ClassVar[str] = "translate"
+    regions: ClassVar[tuple[str, ...]] = ("centre", "half_size")
     centre: Vector = field(metadata=PLACE)
     half_size: Vector = field(metadata=HALF_SIZE)
     velocity: Vector = field(default=(0.0, 0.0, 0.0), metadata=VELOCITY)
@@ -42,9 +44,13 @@ class Translate(Boundary):
     end: float = field(default=FOREVER, metadata=TIME)
     chosen: Array | None = field(default=None, kw_only=True, repr=False, metadata=PER_PARTICLE)
 
-    def prepared(self, setting: Setting) -> Self:
-        chosen = setting.in_box(self.centre, self.half_size)
-        return replace(super().prepared(setting), chosen=jnp.asarray(chosen))
+    def derived(self, setting: Setting) -> Self:
+        chosen = setting.in_box(array_of(self.centre), array_of(self.half_size))
+        return replace(self, chosen=chosen)
+
+    def fastest(self, begin=0.0, end=FOREVER):
+        speed = jnp.sqrt(jnp.sum(array_of(self.velocity) ** 2))
+        return speed_within(speed, begin, end, self.start, self.end)
 
     def on_particles(self, position, velocity, loads, time, dt):
         acts = loads["chosen"] & active(time, self.start, self.end)

@@ -5,10 +5,19 @@ from typing import Any, ClassVar, Literal, Self
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
+from jaxphys.core.errors import InputError
 from jaxphys.core.fields import NON_NEGATIVE, one_of, unit
-from jaxphys.mpm.boundaries.base import DERIVED, STATIC, Setting, array_of, column
+from jaxphys.mpm.boundaries.base import (
+    DERIVED,
+    STATIC,
+    Setting,
+    array_of,
+    changed_number,
+    column,
+)
 from jaxphys.mpm.boundaries.contact import Contact, Face, Surface
 
 Side = Literal["sticky", "slip", "separate", "open"]
@@ -50,6 +59,35 @@ class Walls(Contact):
             frictions = tuple(jnp.asarray(f, setting.dtype) if f else None for f in self.frictions)
         made = replace(self, inset=inset, size=jnp.asarray(size, setting.dtype), frictions=None)
         return replace(Contact.prepared(made, setting), frictions=frictions)
+
+    @property
+    def rough(self) -> bool:
+        return super().rough or any(f is not None for f in self.frictions or ())
+
+    def changed(self, **values) -> Self:
+        """As `Boundary.changed`. `friction` is that of all sides that have some; `frictions` gives
+        one each, zero where a side was built without.
+        """
+        if self.frictions is None or not {"friction", "frictions"} & set(values):
+            return super().changed(**values)
+        rubbing = [index for index, f in enumerate(self.frictions) if f is not None]
+        if "frictions" in values:
+            given = values.pop("frictions")
+            if np.shape(given) != (6,):
+                raise InputError(f"frictions: has shape {np.shape(given)}; give (6,)")
+            known = [i for i, f in enumerate(given) if not isinstance(f, jax.core.Tracer) and f]
+            if set(known) - set(rubbing):
+                raise InputError(
+                    "frictions: some were built as zero, which leaves them out of the program; "
+                    "build the scene with others to change them"
+                )
+        else:
+            given = [values.pop("friction")] * 6
+        sides: list[Any] = list(self.frictions)
+        for index in rubbing:
+            sides[index] = changed_number("friction", sides[index], given[index], NON_NEGATIVE)
+        frictions: Any = tuple(sides)
+        return replace(super().changed(**values), frictions=frictions)
 
     @property
     def _sides(self) -> tuple[tuple[int, int, Surface, float | None], ...]:

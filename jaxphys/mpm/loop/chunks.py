@@ -14,7 +14,7 @@ from jax import Array
 
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.placement import Placement
-from jaxphys.mpm.transfer import base_node
+from jaxphys.mpm.transfer.kernels import QUADRATIC, Kernel
 
 LANES = 16  # chunks are multiples of it, as vector units want
 MIXED = 1 / 8  # share of steps back in the order, from which on sorting pays
@@ -98,7 +98,9 @@ def joined(parts: list[Any], cuts: tuple[Cut, ...], inverse: Array) -> Any:
     return jax.tree.map(one, *parts)
 
 
-def orders(position: Array, grid: Grid, segments: tuple) -> tuple[Array, Array]:
+def orders(
+    position: Array, grid: Grid, segments: tuple, kernel: Kernel = QUADRATIC
+) -> tuple[Array, Array]:
     """(order, inverse), (N,) int32 each: which particle comes at each place, and at which place
     each particle is. By grid cell within a segment, where they have mixed so far that sorting pays;
     as they are otherwise.
@@ -106,7 +108,7 @@ def orders(position: Array, grid: Grid, segments: tuple) -> tuple[Array, Array]:
     position: (3, N) [m].
     """
     count = position.shape[1]
-    base = jax.lax.stop_gradient(base_node(position, grid.spacing, grid.shape))
+    base = jax.lax.stop_gradient(kernel.base_node(position, grid.spacing, grid.shape))
     _, ny, nz = grid.shape
     key = (base[0] * ny + base[1]) * nz + base[2]
     # A step back in a sorted order that is no small one. Bodies that deform have few of them.

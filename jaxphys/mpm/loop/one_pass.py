@@ -1,4 +1,4 @@
-"""One pass over all particles, chunk by chunk, and its transpose.
+"""One pass over all particles, chunk by chunk.
 
     rows --grid update--> nodes --gather--> move --law, contact--> scatter --> rows of the next step
 
@@ -6,10 +6,7 @@ A chunk's temporaries stay in the cache, and between two passes nothing is store
 one needs. The last pass ends after `move`; its flow is what a caller sees of the motion. The first
 one starts with the flow that the state holds, and moves nothing.
 
-The way back is a pass of the same shape: gather the cotangent of the rows, the law's own transpose,
-slopes at the old place, scatter into the cotangent of the nodes. It keeps, of every step, where it
-started, the rows, and what the particles gathered. What rounding left out of the sums is not kept,
-so that the way back sees the places where particles are to within a rounding.
+Its derivatives, in both directions, are passes of the same shape: `pass_derivative.py`.
 
 Several devices share the chunks. Each sums up the rows of its own particles and they add them up.
 """
@@ -34,14 +31,12 @@ from jaxphys.mpm.loop.particle_step import (
     velocity_gradient,
 )
 from jaxphys.mpm.loop.placement import AXIS, spread
+from jaxphys.mpm.loop.rates import slowest
 from jaxphys.mpm.loop.status import NO_FAILURE, failure, first_failure, least
 from jaxphys.mpm.state import Config, Residual
 from jaxphys.mpm.transfer import (
-    base_node,
     gather,
-    gather_slopes,
     scatter,
-    scatter_transpose,
     stencil,
 )
 
@@ -50,7 +45,7 @@ class Inputs(NamedTuple):
     """What a pass may be differentiated by. Of particles one for each segment, in chunks.
 
     matter: its numbers; start: flow of the state, for the first pass, None in the last one; rows:
-    (M, 4), momentum and mass of the nodes.
+    (M, 4), momentum and mass of the nodes, or (M, 8) where they also tell it before any force.
     """
 
     shared: Shared
@@ -79,11 +74,13 @@ class Seen(NamedTuple):
     """What a pass tells, besides. All int32, so that less is known of more particles.
 
     failure: `first_failure`, (); below: the lowest `base_node` of any particle after it, and the
-    highest one times -1, (6,), or None where the whole grid is computed.
+    highest one times -1, (6,), or None where the whole grid is computed; rates: `slowest` of them,
+    (2,), or None where nobody asks.
     """
 
     failure: Array
     below: Array | None
+    rates: Array | None = None
 
     def also(self, other: "Seen") -> "Seen":
         """Of two sets of particles."""
@@ -93,14 +90,18 @@ class Seen(NamedTuple):
 def nothing_seen(config: Config) -> Seen:
     """Of no particles."""
     most = jnp.array(NO_FAILURE, jnp.int32)
-    return Seen(most, None if config.window is None else jnp.full(6, most))
+    return Seen(
+        most,
+        None if config.window is None else jnp.full(6, most),
+        jnp.full(2, most) if config.tells_rates else None,
+    )
 
 
 def extent(config: Config, position: Array) -> Array | None:
     """`Seen.below` of particles (3, N)."""
     if config.window is None:
         return None
-    base = base_node(position, config.grid.spacing, config.grid.shape)
+    base = config.kernel.base_node(position, config.grid.spacing, config.grid.shape)
     return least(jnp.concatenate([base, -base]))
 
 
@@ -120,44 +121,8 @@ def whole(numbers: Any, flags: Any) -> Any:
     )
 
 
-@partial(jax.custom_vjp, nondiff_argnums=(0, 1))
-def one_pass(config: Config, last: bool, inputs: Inputs, fixed: Fixed):
-    """((particles, rows), (residuals, `Seen`)) after a pass, or of the last one ((particles, flow),
-    ...). Everything of particles one for each segment, in chunks.
-
-    config, last: static; see `Inputs` and `Fixed`.
-    """
-    return _forward(config, last, inputs, fixed)[:2]
-
-
-def _one_pass_forward(config, last, inputs, fixed):
-    results, told, gathered = _forward(config, last, inputs, fixed)
-    # Residuals are no part of the way back, nor are the particles' numbers.
-    return (results, told), (inputs, fixed._replace(residuals=None, numbers=None), gathered)
-
-
-def _one_pass_backward(config, last, kept, cotangents):
-    inputs, fixed, gathered = kept
-    (particles, rows_or_flow), _ = cotangents
-    nodes, through_grid = jax.vjp(
-        lambda shared, rows: _nodes(config, shared, rows, fixed), inputs.shared, inputs.rows
-    )
-    run = spread(config.placement, partial(_backward_chunks, config, last), _sum_over_devices)
-    rows, flow = (None, rows_or_flow) if last else (rows_or_flow, None)
-    (shared, nodes), (matter, start, particles) = run(
-        (inputs.shared, nodes, rows, fixed.origin, fixed.target, fixed.first),
-        (inputs.matter, fixed.flags, inputs.particles, gathered, particles, flow),
-    )
-    through_shared, rows = through_grid(nodes)
-    shared = jax.tree.map(jnp.add, shared, through_shared)
-    return Inputs(shared, matter, None if last else start, particles, rows), None
-
-
-one_pass.defvjp(_one_pass_forward, _one_pass_backward)
-
-
-def _nodes(config: Config, shared: Shared, rows: Array, fixed: Fixed) -> Array:
-    """Velocities of the nodes, as particles see them, (M, 4)."""
+def at_nodes(config: Config, shared: Shared, rows: Array, fixed: Fixed) -> Array:
+    """Velocities of the nodes, as particles see them, (M, 4) or (M, 8)."""
     rows = update_grid(shared, fixed.lightest, rows)
     return stages.on_grid(
         shared.boundaries,
@@ -170,10 +135,15 @@ def _nodes(config: Config, shared: Shared, rows: Array, fixed: Fixed) -> Array:
     )
 
 
-def _forward(config: Config, last: bool, inputs: Inputs, fixed: Fixed):
-    nodes = _nodes(config, inputs.shared, inputs.rows, fixed)
+def run_pass(config: Config, last: bool, inputs: Inputs, fixed: Fixed):
+    """((particles, rows, `Wrench`), (residuals, `Seen`), gathered) after a pass, or of the last one
+    ((particles, flow, None), ...). Everything of particles one for each segment, in chunks.
+
+    config, last: static; gathered: the flow that particles had before they moved.
+    """
+    nodes = at_nodes(config, inputs.shared, inputs.rows, fixed)
     run = spread(config.placement, partial(_forward_chunks, config, last), _join_over_devices)
-    (rows, seen), (particles, residuals, flow, gathered) = run(
+    (rows, wrench, seen), (particles, residuals, flow, gathered) = run(
         (inputs.shared, nodes, fixed.origin, fixed.target, fixed.first),
         (
             inputs.start,
@@ -184,47 +154,46 @@ def _forward(config: Config, last: bool, inputs: Inputs, fixed: Fixed):
             fixed.numbers,
         ),
     )
-    return (particles, flow if last else rows), (residuals, seen), gathered
-
-
-def _sum_over_devices(results):
-    return jax.lax.psum(results, AXIS)
+    return (particles, flow if last else rows, wrench), (residuals, seen), gathered
 
 
 def _join_over_devices(results):
-    rows, seen = results
-    rows = rows if rows is None else jax.lax.psum(rows, AXIS)
+    rows, wrench, seen = results
+    if rows is not None:
+        rows, wrench = jax.lax.psum((rows, wrench), AXIS)
     # All of them at once: what is small costs a meeting each.
     numbers, whole = ravel_pytree(seen)
-    return rows, whole(jax.lax.pmin(numbers, AXIS))
+    return rows, wrench, whole(jax.lax.pmin(numbers, AXIS))
 
 
 def _forward_chunks(config: Config, last: bool, common, own):
-    """All chunks of this device, forth."""
+    """All chunks of this device."""
     shared, nodes, origin, target, first = common
-    window, grid = config.computed, config.grid
+    window = config.computed
     rows = None if last else jnp.zeros_like(nodes)
+    wrench = None if last else stages.no_wrench(shared.boundaries, nodes.dtype)
     seen, results = nothing_seen(config), []
 
     def taken(particles):
-        sums, moment = gather(window, stencil(window, origin, particles.position), nodes)
-        return Flow(sums[:3], moment)
+        return Flow.of(*gather(window, stencil(window, origin, particles.position), nodes))
 
     def moved(matter, numbers, particles, residual, flow):
         before = particles.position
-        particles, residual, flow = move(grid, shared, matter, particles, residual, flow, first)
+        particles, residual, flow = move(config, shared, matter, particles, residual, flow, first)
+        C = velocity_gradient(config, flow)
         code = failure(
             config,
             origin,
             before,
             particles.position,
             flow.velocity,
-            velocity_gradient(grid, flow),
+            C,
             particles.deformation,
             shared.dt,
         )
         fault = jnp.where(first, NO_FAILURE, first_failure(code, numbers))
-        return particles, residual, flow, Seen(fault, extent(config, particles.position))
+        below, told = extent(config, particles.position), slowest(config, flow.velocity, C)
+        return particles, residual, flow, Seen(fault, below, told)
 
     def of_last(seen, chunk):
         matter, flags, numbers, particles, residual = chunk
@@ -233,7 +202,7 @@ def _forward_chunks(config: Config, last: bool, common, own):
         return seen.also(seen_too), (*results, flow)
 
     def of_other(law, start, carry, chunk):
-        rows, seen, state = carry
+        rows, wrench, seen, state = carry
         k, matter, flags, numbers = chunk
         matter = whole(matter, flags)
 
@@ -249,7 +218,7 @@ def _forward_chunks(config: Config, last: bool, common, own):
 
         particles, residual, flow = jax.lax.cond(first, started, went_on)
         particles, residual, used, seen_too = moved(matter, numbers, particles, residual, flow)
-        particles, momentum, affine = give(grid, law, shared, matter, particles, used)
+        particles, momentum, affine, own = give(config, law, shared, matter, particles, used)
         at = stencil(window, target, particles.position)
         rows = scatter(window, at, rows, matter.mass, momentum, affine)
         state = jax.tree.map(
@@ -257,73 +226,26 @@ def _forward_chunks(config: Config, last: bool, common, own):
             state,
             (particles, residual),
         )
-        return (rows, seen.also(seen_too), state), flow
+        wrench = jax.tree.map(jnp.add, wrench, own)
+        return (rows, wrench, seen.also(seen_too), state), flow
 
     for (law, _, _), start, particles, residual, *parts in zip(
-        config.runs, *_segments(own, config), strict=True
+        config.runs, *for_runs(own, config), strict=True
     ):
         if last:
             seen, result = jax.lax.scan(of_last, seen, (*parts, particles, residual))
         else:
             count = jnp.arange(len(parts[-1]))
-            (rows, seen, state), flow = jax.lax.scan(
+            (rows, wrench, seen, state), flow = jax.lax.scan(
                 partial(of_other, law, start),
-                (rows, seen, (particles, residual)),
+                (rows, wrench, seen, (particles, residual)),
                 (count, *parts),
             )
             result = (*state, None, flow)
         results.append(result)
-    return (rows, seen), tuple(zip(*results, strict=True))
+    return (rows, wrench, seen), tuple(zip(*results, strict=True))
 
 
-def _backward_chunks(config: Config, last: bool, common, own):
-    """All chunks of this device, back: cotangents in, cotangents out."""
-    shared, nodes, rows, origin, target, first = common
-    window, grid = config.computed, config.grid
-    total, results = (jax.tree.map(jnp.zeros_like, (shared, nodes))), []
-
-    def of_chunk(law, carry, chunk):
-        to_shared, to_nodes = carry
-        matter, flags, particles, gathered, to_particles, to_flow = chunk
-
-        def between(shared, matter, particles, flow):
-            matter = whole(matter, flags)
-            moved, _, flow = move(grid, shared, matter, particles, None, flow, first)
-            if last:
-                return moved, flow
-            return give(grid, law, shared, matter, moved, flow)
-
-        results, transpose = jax.vjp(between, shared, matter, particles, gathered)
-        if last:
-            own_shared, to_matter, to_before, to_gathered = transpose((to_particles, to_flow))
-        else:
-            after, momentum, affine = results
-            at = stencil(window, target, after.position)
-            to_position, to_mass, to_momentum, to_affine = scatter_transpose(
-                window, at, rows, matter.mass, momentum, affine
-            )
-            to_after = to_particles._replace(position=to_particles.position + to_position)
-            own_shared, to_matter, to_before, to_gathered = transpose(
-                (to_after, to_momentum, to_affine)
-            )
-            to_matter = to_matter._replace(mass=to_matter.mass + to_mass)
-        to_start = None
-        if not last:
-            to_start = jax.tree.map(lambda x: jnp.where(first, x, 0), to_gathered)
-            to_gathered = jax.tree.map(lambda x: jnp.where(first, 0, x), to_gathered)
-        at = stencil(window, origin, particles.position)
-        slopes = gather_slopes(window, at, nodes, gathered.velocity, *to_gathered)
-        to_nodes = scatter(window, at, to_nodes, None, *to_gathered)
-        to_before = to_before._replace(position=to_before.position + slopes)
-        to_shared = jax.tree.map(jnp.add, to_shared, own_shared)
-        return (to_shared, to_nodes), (to_matter, to_start, to_before)
-
-    for (law, _, _), *parts in zip(config.runs, *_segments(own, config), strict=True):
-        total, result = jax.lax.scan(partial(of_chunk, law), total, tuple(parts))
-        results.append(result)
-    return total, tuple(zip(*results, strict=True))
-
-
-def _segments(parts: tuple, config: Config) -> list[tuple]:
+def for_runs(parts: tuple, config: Config) -> list[tuple]:
     """Each of some parts for each segment, where one may be None for all of them."""
     return [(None,) * len(config.runs) if part is None else part for part in parts]

@@ -2,7 +2,7 @@
 
 A step is a grid update and one pass over the particles: gather from this grid, `move`, `give` into
 the next one. Between passes particles are placed, deformed and past their law; nobody stores their
-velocity or their affine part.
+affine part, nor their velocity unless the transfer lets it differ from the grid's.
 """
 
 from typing import NamedTuple
@@ -13,21 +13,23 @@ from jax import Array
 from jaxphys.core import algebra, compensated
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
-from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.boundaries.free import Wrench
 from jaxphys.mpm.materials.law import Law
-from jaxphys.mpm.state import Residual
+from jaxphys.mpm.state import Config, Residual
 
 
 class Shared(NamedTuple):
     """What is the same for all particles.
 
-    gravity: (3,) [m/s^2] or None; boundaries: without what they hold of every particle; dt: [s];
-    time: [s], at the start of the step that moves; later: at its end, where the next one starts.
+    gravity: (3,) [m/s^2] or None; boundaries: without what they hold of every particle; dt: [s], of
+    the step that moves; ahead: [s], of the next one, for which a pass gives; time: [s], at the
+    start of the step that moves; later: at its end, where the next one starts.
     """
 
     gravity: Array | None
     boundaries: tuple
     dt: Array
+    ahead: Array
     time: Array
     later: Array
 
@@ -44,29 +46,52 @@ class Matter(NamedTuple):
 
 
 class Particles(NamedTuple):
-    """What a step changes, of some particles, as in `State`; history: the rows of their law."""
+    """What a step changes, of some particles, as in `State`; history: the rows of their law;
+    velocity: None where it is what the grid's is.
+    """
 
     position: Array
     deformation: Array
     total: Array | None
     history: Array | None
     slip: Array | None
+    velocity: Array | None = None
 
 
 class Flow(NamedTuple):
-    """Velocity (3, N) [m/s] and its first moment (3, 3, N) [m^2/s] at some particles."""
+    """Velocity (3, N) [m/s] and its first moment (3, 3, N) [m^2/s] at some particles.
+
+    before: (3, N) [m/s] what the velocity was before forces and boundaries acted on the grid, or
+    None where no particle has a velocity of its own.
+    """
 
     velocity: Array
     moment: Array
+    before: Array | None = None
+
+    @classmethod
+    def of(cls, sums: Array, moments: Array) -> "Flow":
+        """What `gather` gives, by names."""
+        if len(sums) == 4:
+            return cls(sums[:3], moments)
+        return cls(sums[:3], moments[:3], sums[4:7])
+
+    @property
+    def vectors(self) -> tuple[Array, Array]:
+        """Its vectors and their moments, as `scatter` takes them."""
+        if self.before is None:
+            return self.velocity, self.moment
+        vectors = jnp.concatenate([self.velocity, self.before])
+        return vectors, jnp.concatenate([self.moment, jnp.zeros_like(self.moment)])
 
 
-def velocity_gradient(grid: Grid, flow: Flow) -> Array:
-    """C = 4 / dx^2 B (3, 3, N) [1/s] (Jiang et al. 2015)."""
-    return flow.moment * (4.0 / grid.spacing**2)
+def velocity_gradient(config: Config, flow: Flow) -> Array:
+    """C = 4 / dx^2 B (3, 3, N) [1/s], with cubic splines 3 / dx^2 B (Jiang et al. 2015)."""
+    return flow.moment * (config.kernel.inverse_inertia / config.grid.spacing**2)
 
 
 def move(
-    grid: Grid,
+    config: Config,
     shared: Shared,
     matter: Matter,
     particles: Particles,
@@ -75,21 +100,30 @@ def move(
     still: Array | bool,
 ) -> tuple[Particles, Residual | None, Flow]:
     """Particles, residuals and flow after boundaries at particles, x <- x + dt v, and
-    F <- (I + dt C) F.
+    F <- (I + dt C) F. The velocity of the flow is afterwards the particles' own.
 
     still: () bool, whether nothing moves: what comes before the first step.
     """
-    held = stages.on_particles(
-        shared.boundaries,
-        matter.loads,
-        particles.position,
-        flow.velocity,
-        shared.time,
-        shared.dt,
-    )
-    flow = flow._replace(velocity=jnp.where(still, flow.velocity, held))
+
+    def held(velocity):
+        after = stages.on_particles(
+            shared.boundaries,
+            matter.loads,
+            particles.position,
+            velocity,
+            shared.time,
+            shared.dt,
+        )
+        return jnp.where(still, velocity, after)
+
+    own = None
+    if particles.velocity is not None and flow.before is not None:
+        with part("velocity of its own"):
+            beyond = config.transfer.scheme.blend * (particles.velocity - flow.before)
+            own = held(flow.velocity + beyond)
+    flow = flow._replace(velocity=held(flow.velocity))
     dt = jnp.where(still, 0, shared.dt)
-    C = velocity_gradient(grid, flow)
+    C = velocity_gradient(config, flow)
     carried = residual or Residual(None, None, None, None)
     position, position_rest = compensated.add(
         particles.position, carried.position, dt * flow.velocity
@@ -103,53 +137,73 @@ def move(
             total, total_rest = compensated.add(total, carried.total, dt * algebra.matmul(C, total))
     moved = particles._replace(position=position, deformation=F, total=total)
     kept = Residual(position_rest, F_rest, total_rest, None)
+    if own is not None:
+        moved = moved._replace(velocity=own)
+        if particles.slip is not None:
+            # Contact takes a particle to have moved by dt times its own velocity.
+            ahead = jnp.tile(flow.velocity - own, (len(particles.slip) // 3, 1))
+            moved = moved._replace(slip=particles.slip + dt * ahead)
+        flow = flow._replace(velocity=own)
     return moved, None if residual is None else kept, flow
 
 
 def give(
-    grid: Grid, law: Law, shared: Shared, matter: Matter, particles: Particles, flow: Flow
-) -> tuple[Particles, Array, Array]:
+    config: Config, law: Law, shared: Shared, matter: Matter, particles: Particles, flow: Flow
+) -> tuple[Particles, Array, Array, Wrench | None]:
     """Particles past their law (return map and stress of the trial gradient together) and past
-    contact, and what they give to the grid: momentum (3, N) [kg m/s] and affine part (3, 3, N).
+    contact, and what they give to the grid: momentum (3, N) [kg m/s] and affine part (3, 3, N), or
+    (6, N) and (6, 3, N) with what the two are without stress and contact; and what of it a rigid
+    body gave.
     """
     history = particles.history
     kept = jnp.zeros((0, *matter.mass.shape), matter.mass.dtype) if history is None else history
     with part(f"law {law.name}"):
-        F, stress, kept = law.update(matter.parameters, particles.deformation, kept)
+        F, stress, kept = law.update(matter.parameters, particles.deformation, kept, shared.dt)
     # Momentum changes by m C per metre, less the impulse of the stress: -dt V tau grad w, in which
-    # MLS-MPM replaces grad w by w (x_i - x_p) 4 / dx^2.
-    impulse = (-4.0 / grid.spacing**2) * shared.dt * matter.volume
-    affine = matter.mass * velocity_gradient(grid, flow) + impulse * stress
+    # MLS-MPM replaces grad w by w (x_i - x_p) 4 / dx^2, or 3 / dx^2 for a cubic w.
+    per_metre = -config.kernel.inverse_inertia / config.grid.spacing**2
+    impulse = per_metre * shared.ahead * matter.volume
+    spin = None
+    if config.transfer.scheme.affine:
+        spin = matter.mass * velocity_gradient(config, flow)
+    affine = impulse * stress if spin is None else spin + impulse * stress
     momentum = matter.mass * flow.velocity
-    given, slip = stages.impulses(
+    given, slip, wrench = stages.impulses(
         shared.boundaries,
         matter.loads,
         particles.position,
         flow.velocity,
         particles.slip,
         shared.later,
+        shared.ahead,
         shared.dt,
     )
-    if given is not None:
+    if particles.velocity is not None:
+        affine = jnp.concatenate([affine, jnp.zeros_like(affine) if spin is None else spin])
+        momentum = jnp.concatenate([momentum if given is None else momentum + given, momentum])
+    elif given is not None:
         momentum = momentum + given
     after = particles._replace(deformation=F, slip=slip)
     if history is not None:
         after = after._replace(history=kept)
-    return after, momentum, affine
+    return after, momentum, affine, wrench
 
 
 def update_grid(shared: Shared, lightest: Array, rows: Array) -> Array:
-    """Node velocities [m/s] from momentum and mass rows, both (M, 4); the last column is void.
+    """Node velocities [m/s] from momentum and mass rows, both (M, 4), column 3 of what it gives
+    being void; or (M, 8), where the second half has what velocities were before any force.
 
     lightest: [kg] () nodes with no more stand still: below eps^2 of the heaviest particle a node
     adds less than round-off to any particle, and dividing by its mass could overflow.
     """
-    mass = rows[:, 3:]
+    mass = rows[:, 3:4]
     filled = mass > lightest
     rows = rows / jnp.where(filled, mass, 1.0)
     if shared.gravity is not None:
         with part("gravity"):
             # All four columns at once: XLA would otherwise pad each row that a transfer reads.
             fall = jnp.concatenate([shared.gravity, jnp.zeros_like(shared.gravity[:1])])
+            if rows.shape[1] == 8:
+                fall = jnp.concatenate([fall, jnp.zeros_like(fall)])
             rows = rows + shared.dt * fall
     return jnp.where(filled, rows, 0.0)

@@ -15,17 +15,19 @@ from jaxphys.core import compensated
 from jaxphys.core.errors import InputError
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
-from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.loop import rigid_body
 from jaxphys.mpm.loop.adjoint import Adjoint, Plain, repeat
-from jaxphys.mpm.loop.chunks import cut, cuts, joined, numbers, orders
-from jaxphys.mpm.loop.one_pass import Fixed, Inputs, extent, numbers_and_flags, one_pass
+from jaxphys.mpm.loop.chunks import Cut, cut, cuts, joined, numbers, orders
+from jaxphys.mpm.loop.one_pass import Fixed, Inputs, extent, numbers_and_flags
 from jaxphys.mpm.loop.particle_step import Flow, Matter, Particles, Shared, velocity_gradient
+from jaxphys.mpm.loop.pass_derivative import one_pass
 from jaxphys.mpm.loop.placement import gathered
+from jaxphys.mpm.loop.rates import slowest
+from jaxphys.mpm.loop.replay import check_sequence, replayed
 from jaxphys.mpm.loop.status import MOST_PARTICLES, after_step
-from jaxphys.mpm.loop.step_check import checked
-from jaxphys.mpm.materials.elasticity import with_moduli
-from jaxphys.mpm.state import OK, Config, Model, Residual, State, Status
-from jaxphys.mpm.stepping.bounds import contact_bound
+from jaxphys.mpm.loop.step_check import checked, stiffening
+from jaxphys.mpm.state import OK, Config, Model, Residual, RigidBody, State, Status
+from jaxphys.mpm.stepping.bounds import contact_bound, with_wave_modulus
 
 PLAIN = Plain()
 
@@ -33,8 +35,8 @@ PLAIN = Plain()
 class Chunks(NamedTuple):
     """A state in chunks, on its way from pass to pass. Of particles one for each segment.
 
-    rows, origin: momentum and mass of the nodes for the next step, and their window; below: as in
-    `Seen`; first: () bool, whether no pass was yet.
+    rows, origin: momentum and mass of the nodes for the next step, and their window; below, rates:
+    as in `Seen`; first: () bool, whether no pass was yet; rigid: as in `State`.
     """
 
     particles: tuple[Particles, ...]
@@ -42,10 +44,12 @@ class Chunks(NamedTuple):
     rows: Array
     origin: Array
     below: Array | None
+    rates: Array | None
     time: Array
     time_residual: Array | None
     status: Status
     first: Array
+    rigid: RigidBody | None
 
 
 def rollout(
@@ -58,14 +62,19 @@ def rollout(
     not numbers. `steps` may be traced, so that one program serves any number of them; then there is
     no reverse mode.
 
-    Unless `Config.check_step` is off, a `dt` beyond `bounds.hard_limit` of the state fails at
+    `dt` may also be of each step its own, (M,), of which the first `steps` are taken: a sequence
+    that `rollout_adaptively` took, replayed. The gradient is that of these very steps. Traced
+    `steps` then have room for M in the program, and reverse mode.
+
+    Unless `Config.check_step` is off, a first `dt` beyond `bounds.hard_limit` of the state fails at
     once.
 
     Raises:
-        InputError: the state does not fit the model, or there are too many particles.
+        InputError: the state does not fit the model, there are too many particles, or fewer `dt`
+            than steps.
     """
     end = advance(config, model, state, dt, steps, adjoint, check=config.check_step)
-    return _keep_good(state, end, steps)
+    return keep_good(state, end, steps)
 
 
 def step(config: Config, model: Model, state: State, dt) -> State:
@@ -96,36 +105,77 @@ def advance(
     """The state `steps` steps of `dt` [s] later, whatever happens on the way; check: whether a `dt`
     that the state does not allow is told in the status.
     """
-    _check_fit(config, model, state)
-    dtype = state.position.dtype
-    dt = jnp.asarray(dt, dtype)
-    segments = cuts(config.runs, config.placement)
-    order, inverse = orders(state.position, config.grid, config.runs)
-    matter, flags = numbers_and_flags(_matter(config, model, segments, order))
-    start = _flows(config.grid, state, segments, order)
-    names = tuple(numbers(into, order) for into in segments)
-    boundaries = tuple(boundary.shared() for boundary in model.boundaries)
-    lightest = jnp.finfo(dtype).eps ** 2 * jnp.max(model.mass)
+    dt = jnp.asarray(dt, state.position.dtype)
+    check_sequence(dt, steps)
+    passes = prepared(config, model, state)
+    chunks = passes.cut()
+    if check:
+        chunks = passes.checked(chunks, dt if dt.ndim == 0 else dt[0])
+    if dt.ndim == 0:
+        chunks = repeat(adjoint, lambda chunks: passes.run(chunks, dt, dt), chunks, steps)
+        return passes.end(chunks, dt)
+    chunks, final = replayed(adjoint, passes.run, chunks, dt, steps)
+    return passes.end(chunks, final)
 
-    def run(chunks: Chunks, last: bool):
+
+class Passes(NamedTuple):
+    """Passes over one state and what all of them share. Of particles one for each segment."""
+
+    config: Config
+    model: Model
+    state: State
+    segments: tuple[Cut, ...]
+    order: Array
+    inverse: Array
+    matter: tuple[Matter, ...]
+    flags: tuple[Matter, ...]
+    flows: tuple[Flow, ...]
+    names: tuple[Array, ...]
+    boundaries: tuple
+    lightest: Array
+
+    def cut(self) -> Chunks:
+        """The state in chunks, before the first pass."""
+        return cut_state(self.config, self.state, self.segments, self.order)
+
+    def checked(self, chunks: Chunks, dt: Array) -> Chunks:
+        """With the status of a state that is too stiff for `dt` [s]."""
+        contact = jax.lax.stop_gradient(contact_bound(self.model, self.config.grid))
+        own = (self.matter, self.flags, *stiffening(self.config, chunks.particles), self.names)
+        return chunks._replace(
+            status=checked(self.config, *own, contact, chunks.status, dt),
+        )
+
+    def run(self, chunks: Chunks, dt: Array, ahead: Array, last: bool = False) -> Chunks:
+        """One pass: it ends the step of `dt` [s] and begins one of `ahead` [s]; the first one only
+        begins, the last one only ends.
+        """
         moves = jnp.where(chunks.first, 0, dt)
         later, later_residual = compensated.add(chunks.time, chunks.time_residual, moves)
-        shared = Shared(model.gravity, boundaries, dt, chunks.time, later)
-        target = _target(config, chunks)
-        (particles, rows), (residuals, seen) = one_pass(
-            config,
+        boundaries, body = self.boundaries, None
+        obstacle = rigid_body.free_one(boundaries)
+        if obstacle is not None and chunks.rigid is not None:
+            body = rigid_body.moved(obstacle, chunks.rigid, moves)
+            boundaries = rigid_body.placed(boundaries, obstacle, body)
+        shared = Shared(self.model.gravity, boundaries, dt, ahead, chunks.time, later)
+        target = window_origin(self.config, chunks.below)
+        start = None if last else self.flows
+        (particles, rows, wrench), (residuals, seen) = one_pass(
+            self.config,
             last,
-            Inputs(shared, matter, None if last else start, chunks.particles, chunks.rows),
+            Inputs(shared, self.matter, start, chunks.particles, chunks.rows),
             Fixed(
                 chunks.residuals,
-                names,
-                flags,
+                self.names,
+                self.flags,
                 chunks.origin,
                 target,
                 chunks.first,
-                jax.lax.stop_gradient(lightest),
+                jax.lax.stop_gradient(self.lightest),
             ),
         )
+        if body is not None and wrench is not None:
+            body = rigid_body.pushed(boundaries, body, wrench, self.model.gravity, later, dt, ahead)
         passed = after_step(chunks.status, seen.failure)
         status = Status(
             *(jnp.where(chunks.first, a, b) for a, b in zip(chunks.status, passed, strict=True))
@@ -137,27 +187,58 @@ def advance(
             rows,
             target,
             seen.below,
+            seen.rates,
             later,
             later_residual,
             status,
             jnp.array(False),
+            body,
         )
 
-    chunks = _cut_state(config, state, segments, order)
-    if check:
-        deformation = tuple(particles.deformation for particles in chunks.particles)
-        contact = jax.lax.stop_gradient(contact_bound(model, config.grid))
-        status = checked(config, matter, flags, deformation, names, contact, chunks.status, dt)
-        chunks = chunks._replace(status=status)
-    chunks = repeat(adjoint, partial(run, last=False), chunks, steps)
-    return _join_state(config, state, run(chunks, last=True), segments, inverse)
+    def end(self, chunks: Chunks, dt: Array) -> State:
+        """The state after the last pass, which ends the step of `dt` [s]."""
+        chunks = self.run(chunks, dt, dt, last=True)
+        return join_state(self.config, self.state, chunks, self.segments, self.inverse)
 
 
-def _check_fit(config: Config, model: Model, state: State) -> None:
+def prepared(config: Config, model: Model, state: State) -> Passes:
+    """The passes over a state.
+
+    Raises:
+        InputError: the state does not fit the model, or there are too many particles.
+    """
+    check_fit(config, model, state)
+    model = with_wave_modulus(config, model)
+    segments = cuts(config.runs, config.placement)
+    order, inverse = orders(state.position, config.grid, config.runs, config.kernel)
+    matter, flags = numbers_and_flags(matter_of(config, model, segments, order))
+    return Passes(
+        config,
+        model,
+        state,
+        segments,
+        order,
+        inverse,
+        matter,
+        flags,
+        flows_of(config, state, segments, order),
+        tuple(numbers(into, order) for into in segments),
+        tuple(boundary.shared() for boundary in model.boundaries),
+        jnp.finfo(state.position.dtype).eps ** 2 * jnp.max(model.mass),
+    )
+
+
+def check_fit(config: Config, model: Model, state: State) -> None:
+    """Raises `InputError` if the state does not fit the model, or particles are too many."""
     rows = sum(boundary.rows for boundary in model.boundaries)
     if rows != (0 if state.slip is None else state.slip.shape[0]):
         raise InputError(
             "State.slip does not fit the boundaries, some of which have friction; give "
+            "initial_state(..., boundaries=model.boundaries)."
+        )
+    if (state.rigid is None) == any(boundary.free for boundary in model.boundaries):
+        raise InputError(
+            "State.rigid does not fit the boundaries, of which one is free, or none; give "
             "initial_state(..., boundaries=model.boundaries)."
         )
     if config.particles > MOST_PARTICLES:
@@ -167,26 +248,34 @@ def _check_fit(config: Config, model: Model, state: State) -> None:
         )
 
 
-def _matter(config, model, segments, order) -> tuple[Matter, ...]:
+def matter_of(config, model, segments, order) -> tuple[Matter, ...]:
+    """What no step changes of the particles, one for each run, in chunks."""
     loads = stages.loads(model, config.grid)
     found = []
     for (law, _, _), into in zip(config.runs, segments, strict=True):
         mass, volume, load = cut((model.mass, model.volume, loads), into, order, empty=True)
-        parameters = with_moduli({name: model.parameters[name] for name in law.parameters})
+        parameters = law.prepare({name: model.parameters[name] for name in law.parameters})
         found.append(Matter(mass, volume, cut(parameters, into, order), load))
     return tuple(found)
 
 
-def _flows(grid: Grid, state: State, segments, order) -> tuple[Flow, ...]:
-    moment = state.affine * (grid.spacing**2 / 4)
-    return tuple(cut(Flow(state.velocity, moment), into, order) for into in segments)
+def flows_of(config: Config, state: State, segments, order) -> tuple[Flow, ...]:
+    """The flow that a state holds, one for each run, in chunks."""
+    moment = state.affine * (config.grid.spacing**2 / config.kernel.inverse_inertia)
+    # Before the first step no force has acted.
+    before = state.velocity if config.transfer.keeps_velocity else None
+    flow = Flow(state.velocity, moment, before)
+    return tuple(cut(flow, into, order) for into in segments)
 
 
-def _cut_state(config: Config, state: State, segments, order) -> Chunks:
+def cut_state(config: Config, state: State, segments, order) -> Chunks:
+    """A state in chunks, before any pass."""
     particles, residuals = [], []
     rest = None if state.residual is None else state.residual._replace(time=None)
     for (law, _, _), into in zip(config.runs, segments, strict=True):
         own = Particles(state.position, state.deformation, state.total, None, state.slip)
+        if config.transfer.keeps_velocity:
+            own = own._replace(velocity=state.velocity)
         own = cut(own, into, order)
         if law.history and state.history is not None:
             with part("history"):
@@ -196,28 +285,33 @@ def _cut_state(config: Config, state: State, segments, order) -> Chunks:
     return Chunks(
         tuple(particles),
         tuple(residuals),
-        jnp.zeros((config.computed.nodes, 4), state.position.dtype),
+        jnp.zeros((config.computed.nodes, config.transfer.columns), state.position.dtype),
         jnp.zeros(3, jnp.int32),
         extent(config, jax.lax.stop_gradient(state.position)),
+        slowest(config, *jax.lax.stop_gradient((state.velocity, state.affine))),
         state.time,
         None if state.residual is None else state.residual.time,
         state.status,
         jnp.array(True),
+        state.rigid,
     )
 
 
-def _target(config: Config, chunks: Chunks) -> Array:
-    """First node of the window for the places after this pass: as much room on either side."""
-    if chunks.below is None:
-        return chunks.origin
-    lowest, highest = chunks.below[:3], -chunks.below[3:]
+def window_origin(config: Config, below: Array | None) -> Array:
+    """First node (3,) of the window for particles of an extent `Seen.below`: as much room on either
+    side.
+    """
+    if below is None:
+        return jnp.zeros(3, jnp.int32)
+    lowest, highest = below[:3], -below[3:]
     shape = np.array(config.nodes, np.int32)
     room = np.array(config.grid.shape, np.int32) - shape
-    free = shape - 3 - (highest - lowest)
+    free = shape - config.kernel.width - (highest - lowest)
     return jnp.clip(lowest - jnp.maximum(free, 0) // 2, 0, room)
 
 
-def _join_state(config: Config, before: State, chunks: Chunks, segments, inverse) -> State:
+def join_state(config: Config, before: State, chunks: Chunks, segments, inverse) -> State:
+    """The state that chunks are; their rows hold the flows, as the last pass gives them."""
     particles, flow, residuals = gathered(
         config.placement, (chunks.particles, chunks.rows, chunks.residuals)
     )
@@ -240,7 +334,7 @@ def _join_state(config: Config, before: State, chunks: Chunks, segments, inverse
     state = State(
         position=particles.position,
         velocity=flow.velocity,
-        affine=velocity_gradient(config.grid, flow),
+        affine=velocity_gradient(config, flow),
         deformation=particles.deformation,
         total=particles.total,
         history=history,
@@ -248,6 +342,7 @@ def _join_state(config: Config, before: State, chunks: Chunks, segments, inverse
         status=chunks.status,
         residual=residual,
         slip=particles.slip,
+        rigid=chunks.rigid,
     )
     if config.placement.devices == 1:
         return state
@@ -261,7 +356,7 @@ def _padded(rows: Array | None, into, count: int, dtype) -> Array:
     return jnp.pad(rows, ((0, 0), (0, count - rows.shape[1]), (0, 0)))
 
 
-def _keep_good(before: State, after: State, steps) -> State:
+def keep_good(before: State, after: State, steps) -> State:
     """`after`, or where it failed, or no step was taken, `before` with the status and step count
     of the failure.
     """

@@ -11,14 +11,15 @@ from jaxphys.mpm.state import (
     INVERTED,
     LEFT_GRID,
     LEFT_WINDOW,
+    NOT_CONVERGED,
     NOT_FINITE,
     OK,
     STEP_TOO_LARGE,
+    TOO_MANY_STEPS,
     UNSTABLE_STEP,
     Config,
     Status,
 )
-from jaxphys.mpm.transfer import base_node, inside
 
 LANES = 16
 COLLAPSE = 1e-3  # share of its volume below which a particle counts as collapsed
@@ -61,6 +62,14 @@ _CAUSES = {
         "is stiffer than the step allows",
         "take a smaller dt (mpm.largest_stable_dt gives one), or a softer or denser material",
     ),
+    TOO_MANY_STEPS: (
+        "keeps the steps so short that a frame takes more than the most allowed",
+        "raise Adaptive.most_steps, or take a softer or denser material or a coarser grid",
+    ),
+    NOT_CONVERGED: (
+        "the equations of an implicit step were not solved, however short it was",
+        "raise the tolerance, the iterations or most_steps of Implicit, or take explicit steps",
+    ),
 }
 
 
@@ -75,8 +84,9 @@ def check(status: Status, frame: int | None = None) -> None:
     what, remedy = _CAUSES[code]
     where = "" if frame is None else f"frame {frame}, "
     number, particle = int(status.step), int(status.particle)
+    who = f"particle {particle} " if particle >= 0 else ""
     raise SimulationError(
-        f"Simulation failed at {where}step {number}: particle {particle} {what}; {remedy}.",
+        f"Simulation failed at {where}step {number}: {who}{what}; {remedy}.",
         frame,
         number,
         particle,
@@ -102,7 +112,7 @@ def failure(
 
     origin: of the window (3,); before: positions (3, N) from which the step started.
     """
-    grid = config.grid
+    grid, kernel = config.grid, config.kernel
     # Sums written out: a reduction within a fusion is not vectorised.
     v, c, f = (algebra.numbers(x) for x in (velocity, C, F))
     finite = jnp.isfinite(algebra.total(v) + algebra.total(f))
@@ -112,10 +122,10 @@ def failure(
     code = jnp.full(finite.shape, OK, jnp.int32)
     if config.nodes != grid.shape:
         # A particle outside of the window was clamped in the transfers of this very step.
-        room = jnp.array(config.nodes, jnp.int32)[:, None] - 3
-        local = base_node(before, grid.spacing, grid.shape) - origin[:, None]
+        room = jnp.array(config.nodes, jnp.int32)[:, None] - kernel.width
+        local = kernel.base_node(before, grid.spacing, grid.shape) - origin[:, None]
         code = jnp.where(jnp.all((local >= 0) & (local <= room), axis=0), code, LEFT_WINDOW)
-    code = jnp.where(inside(position, grid.spacing, grid.shape), code, LEFT_GRID)
+    code = jnp.where(kernel.inside(position, grid.spacing, grid.shape), code, LEFT_GRID)
     code = jnp.where(volume < COLLAPSE, COLLAPSED, code)
     code = jnp.where(volume <= 0, INVERTED, code)
     code = jnp.where(slow, code, STEP_TOO_LARGE)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.mpm.loop.one_pass import whole
-from jaxphys.mpm.loop.particle_step import Matter
+from jaxphys.mpm.loop.particle_step import Matter, Particles
 from jaxphys.mpm.loop.placement import AXIS, spread
 from jaxphys.mpm.loop.status import NO_FAILURE, least
 from jaxphys.mpm.state import OK, UNSTABLE_STEP, Config, Status
@@ -19,6 +19,7 @@ def checked(
     matter: tuple[Matter, ...],
     flags: tuple[Matter, ...],
     deformation: tuple[Array, ...],
+    history: tuple[Array | None, ...],
     numbers: tuple[Array, ...],
     contact: Array,
     status: Status,
@@ -26,10 +27,11 @@ def checked(
 ) -> Status:
     """`status`, which becomes UNSTABLE_STEP if it is sound but the state too stiff for `dt` [s].
 
-    Of particles one for each run, in chunks; contact: `contact_bound` [s], ().
+    Of particles one for each run, in chunks; history: of those whose stiffness depends on it;
+    contact: `contact_bound` [s], ().
     """
     run = spread(config.placement, lambda _, own: (weakest(config, own), None), _least_of_devices)
-    own = jax.lax.stop_gradient((matter, flags, deformation, numbers))
+    own = jax.lax.stop_gradient((matter, flags, deformation, history, numbers))
     (limit, particle), _ = run(None, own)
     # A step at the limit passes, whichever way its digits were rounded; not a number does not.
     allowed = jax.lax.stop_gradient(dt) <= (1 + 1e-4) * jnp.minimum(limit, contact)
@@ -41,6 +43,17 @@ def checked(
     )
 
 
+def stiffening(config: Config, particles: tuple[Particles, ...]) -> tuple[tuple, tuple]:
+    """What the stiffness of particles depends on, for each run: deformations, and histories or None
+    where they change nothing.
+    """
+    history = tuple(
+        own.history if law.hardened is not None else None
+        for (law, _, _), own in zip(config.runs, particles, strict=True)
+    )
+    return tuple(own.deformation for own in particles), history
+
+
 def weakest(config: Config, own) -> tuple[Array, Array]:
     """The least `hard_limit` [s] of any particle, (), and the number of the first that has it.
 
@@ -49,10 +62,11 @@ def weakest(config: Config, own) -> tuple[Array, Array]:
     best = jnp.array(jnp.inf, own[2][0].dtype), jnp.array(NO_FAILURE, jnp.int32)
 
     def of_chunk(law, best, chunk):
-        matter, flags, F, numbers = chunk
+        matter, flags, F, history, numbers = chunk
         matter = whole(matter, flags)
+        parameters = law.present(matter.parameters, history)
         density = matter.mass / jnp.where(matter.mass > 0, matter.volume, 1)
-        limits = hard_limit(law, matter.parameters, F, density, config.grid.spacing)
+        limits = hard_limit(law, parameters, F, density, config.grid.spacing, config.transfer)
         # NaN counts as the least of all.
         limits = jnp.where(jnp.isnan(limits), -1, limits)
         lowest = least(limits)

@@ -7,18 +7,17 @@ import jax
 import numpy as np
 
 from jaxphys.mpm.state import Config, State
-from jaxphys.mpm.transfer import base_node
 
 # A node costs about a hundredth of a particle, and several devices send it to each other: where the
 # grid has so many for each particle, a part of it is worth another program.
 WORTH = 2
-GROWTH, MARGIN = 1.1, 5  # room for what a frame adds: a share of the span, and nodes
+GROWTH, MARGIN = 1.1, 2  # room for what a frame adds: a share of the span, and nodes
 MULTIPLE = 4  # few different windows, since each is compiled
 
 
 @jax.jit(static_argnames="config")
 def _span(config: Config, position):
-    base = base_node(position, config.grid.spacing, config.grid.shape)
+    base = config.kernel.base_node(position, config.grid.spacing, config.grid.shape)
     return base.max(axis=1) - base.min(axis=1)
 
 
@@ -30,7 +29,9 @@ def windowed(config: Config, state: State) -> Config:
     if nodes < WORTH * config.particles:
         return replace(config, window=None)
     span = np.asarray(_span(replace(config, window=None), state.position))
-    wanted = np.ceil((GROWTH * span + MARGIN) / MULTIPLE).astype(int) * MULTIPLE
+    wanted = (
+        np.ceil((GROWTH * span + config.kernel.width + MARGIN) / MULTIPLE).astype(int) * MULTIPLE
+    )
     shape = np.minimum(wanted, config.grid.shape)
     if 2 * math.prod(shape.tolist()) > nodes:
         return replace(config, window=None)

@@ -1,5 +1,5 @@
-"""The five materials of the paper, with defaults for an object about one metre wide: the same with
-which `default_scene` shows them.
+"""The materials that users know by name, with defaults for an object about one metre wide: the same
+with which `default_scene` shows them.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,11 +11,17 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
+from jaxphys.mpm.materials.cohesion import WET_SAND
 from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
+from jaxphys.mpm.materials.fibres import FIBRES
+from jaxphys.mpm.materials.fluid import FLUID
 from jaxphys.mpm.materials.fracture import FRACTURE
 from jaxphys.mpm.materials.law import Law
-from jaxphys.mpm.materials.parameters import ALTERNATIVES, check_parameter
+from jaxphys.mpm.materials.parameters import DENSITY, Alternative, Parameter, check_parameter
 from jaxphys.mpm.materials.plasticity import DRUCKER_PRAGER, UNCORRECTED_DRUCKER_PRAGER, VON_MISES
+from jaxphys.mpm.materials.snow import SNOW
+from jaxphys.mpm.materials.viscoelasticity import STANDARD_SOLID
+from jaxphys.mpm.materials.viscoplasticity import HERSCHEL_BULKLEY, PLASTICINE
 
 
 @dataclass(frozen=True)
@@ -37,9 +43,16 @@ class Material:
     defaults: Mapping[str, float]
 
     @property
-    def alternatives(self) -> tuple[str, ...]:
-        """Parameters that may be given in place of one that its laws read."""
-        return tuple(key for key, other in ALTERNATIVES.items() if other.name in self.defaults)
+    def alternatives(self) -> dict[str, Alternative]:
+        """What may be given in place of a parameter that its law reads, by name."""
+        return {other.parameter.name: other for other in self.law.alternatives}
+
+    @property
+    def declared(self) -> dict[str, Parameter]:
+        """Every parameter that may be given, by name: those with defaults first."""
+        own = {parameter.name: parameter for parameter in (*self.law.declared, DENSITY)}
+        others = {name: other.parameter for name, other in self.alternatives.items()}
+        return {name: own[name] for name in self.defaults} | others
 
 
 def _material(
@@ -48,62 +61,157 @@ def _material(
     return Material(name, law, others, description, MappingProxyType(defaults))
 
 
-MATERIALS: Mapping[str, Material] = MappingProxyType(
-    {
-        material.name: material
-        for material in (
-            _material(
-                "elastic",
-                FIXED_COROTATED,
-                "rubber: springs back, hardly sags (fixed corotated)",
-                others=(NEO_HOOKEAN, HENCKY),
-                youngs_modulus=2e5,
-                poisson_ratio=0.3,
-                density=400.0,
-            ),
-            _material(
-                "jelly",
-                FIXED_COROTATED,
-                "soft and hardly compressible: squashes and wobbles (fixed corotated)",
-                others=(NEO_HOOKEAN, HENCKY),
-                youngs_modulus=1.5e4,
-                poisson_ratio=0.4,
-                density=300.0,
-            ),
-            _material(
-                "metal",
-                VON_MISES,
-                "springs back up to its yield stress, keeps the dent beyond it (Hencky, von Mises)",
-                youngs_modulus=1e6,
-                poisson_ratio=0.3,
-                density=1000.0,
-                yield_stress=4.3e4,
-                hardening=0.0,
-            ),
-            _material(
-                "sand",
-                DRUCKER_PRAGER,
-                "dry grains: resist only while pressed together (Hencky, Drucker-Prager)",
-                others=(UNCORRECTED_DRUCKER_PRAGER,),
-                youngs_modulus=5e5,
-                poisson_ratio=0.3,
-                density=1600.0,
-                friction_angle=35.0,
-            ),
-            _material(
-                "fracture",
-                FRACTURE,
-                "elastic until stretched too far, then breaks into pieces (Hencky, damage)",
-                youngs_modulus=8e5,
-                poisson_ratio=0.2,
-                density=500.0,
-                fracture_strain=0.08,
-                softening_strain=0.1,
-                friction_angle=30.0,
-            ),
-        )
-    }
-)
+_materials: dict[str, Material] = {
+    material.name: material
+    for material in (
+        _material(
+            "elastic",
+            FIXED_COROTATED,
+            "rubber: springs back, hardly sags (fixed corotated)",
+            others=(NEO_HOOKEAN, HENCKY),
+            youngs_modulus=2e5,
+            poisson_ratio=0.3,
+            density=400.0,
+        ),
+        _material(
+            "jelly",
+            FIXED_COROTATED,
+            "soft and hardly compressible: squashes and wobbles (fixed corotated)",
+            others=(NEO_HOOKEAN, HENCKY),
+            youngs_modulus=1.5e4,
+            poisson_ratio=0.4,
+            density=300.0,
+        ),
+        _material(
+            "metal",
+            VON_MISES,
+            "springs back up to its yield stress, keeps the dent beyond it (Hencky, von Mises)",
+            youngs_modulus=1e6,
+            poisson_ratio=0.3,
+            density=1000.0,
+            yield_stress=4.3e4,
+            hardening=0.0,
+        ),
+        _material(
+            "sand",
+            DRUCKER_PRAGER,
+            "dry grains: resist only while pressed together (Hencky, Drucker-Prager)",
+            others=(UNCORRECTED_DRUCKER_PRAGER,),
+            youngs_modulus=5e5,
+            poisson_ratio=0.3,
+            density=1600.0,
+            friction_angle=35.0,
+        ),
+        _material(
+            "fracture",
+            FRACTURE,
+            "elastic until stretched too far, then breaks into pieces (Hencky, damage)",
+            youngs_modulus=8e5,
+            poisson_ratio=0.2,
+            density=500.0,
+            fracture_strain=0.08,
+            softening_strain=0.1,
+            friction_angle=30.0,
+        ),
+        _material(
+            "water",
+            FLUID,
+            "splashes, and lies flat and still in the end (Tait's pressure, Newton's viscosity)",
+            bulk_modulus=5e5,
+            viscosity=1e-3,
+            density=1000.0,
+        ),
+        _material(
+            "cream",
+            HERSCHEL_BULKLEY,
+            "flows when pushed, holds a heap when left alone (Herschel-Bulkley)",
+            bulk_modulus=2e5,
+            shear_modulus=1e4,
+            shear_yield_stress=250.0,
+            consistency=50.0,
+            flow_index=0.5,
+            density=500.0,
+        ),
+        _material(
+            "toothpaste",
+            HERSCHEL_BULKLEY,
+            "a thick paste: sinks down slowly, and stays as it lies (Herschel-Bulkley)",
+            bulk_modulus=2e5,
+            shear_modulus=3e4,
+            shear_yield_stress=1e3,
+            consistency=1.5e3,
+            flow_index=0.5,
+            density=1300.0,
+        ),
+        _material(
+            "plasticine",
+            PLASTICINE,
+            "kneads: stays as it was pressed, slowly (Hencky, viscous von Mises)",
+            youngs_modulus=5e5,
+            poisson_ratio=0.4,
+            yield_stress=1.5e4,
+            plastic_viscosity=500.0,
+            density=1500.0,
+        ),
+        _material(
+            "snow",
+            SNOW,
+            "packs where it is pressed, crumbles where it is pulled (fixed corotated, hardening)",
+            youngs_modulus=1.4e5,
+            poisson_ratio=0.2,
+            critical_compression=0.025,
+            critical_stretch=0.0075,
+            packing_hardening=10.0,
+            density=400.0,
+        ),
+        _material(
+            "wet-sand",
+            WET_SAND,
+            "grains that hold together: stands steep, slumps in lumps (Drucker-Prager, cohesion)",
+            youngs_modulus=5e5,
+            poisson_ratio=0.3,
+            friction_angle=35.0,
+            cohesion=2.5e3,
+            density=1800.0,
+        ),
+        _material(
+            "memory-foam",
+            STANDARD_SOLID,
+            "gives way slowly and comes back slowly (neo-Hookean beside a Maxwell element)",
+            youngs_modulus=5e3,
+            poisson_ratio=0.05,
+            relaxing_modulus=2.5e4,
+            relaxation_time=0.05,
+            density=200.0,
+        ),
+        _material(
+            "muscle",
+            FIBRES,
+            "soft across its fibres, stiff along them (neo-Hookean, Holzapfel's fibres)",
+            youngs_modulus=6e3,
+            poisson_ratio=0.4,
+            fibre_stiffness=5e4,
+            fibre_stiffening=1.0,
+            fibre_azimuth=0.0,
+            fibre_elevation=0.0,
+            density=300.0,
+        ),
+    )
+}
+MATERIALS: Mapping[str, Material] = MappingProxyType(_materials)
+
+
+def add(material: Material) -> None:
+    """Puts a material into the catalogue, beside those of the package."""
+    _materials[material.name] = material
+
+
+def declared_parameters() -> dict[str, Parameter]:
+    """Every parameter of every material, by name, in the order in which they are listed."""
+    found: dict[str, Parameter] = {}
+    for material in MATERIALS.values():
+        found |= {name: one for name, one in material.declared.items() if name not in found}
+    return found
 
 
 def get_material(name: str, law: str | None = None) -> Material:
@@ -132,17 +240,17 @@ def overridden(material: Material, overrides: Mapping | None) -> dict:
         InputError: a parameter that this material does not have (with the nearest that it has), one
             that is given twice under two names, or a value out of range.
     """
-    found, names = {}, {*material.defaults, *material.alternatives}
+    found, names, alternatives = {}, material.declared, material.alternatives
     for given, value in (overrides or {}).items():
         if given not in names:
             raise InputError(
                 f"{material.name}: unknown parameter {given!r}; {nearest(given, names)}"
             )
-        check_parameter(given, value, material.name)
+        check_parameter(names[given], value, material.name)
         name = given
-        if given in ALTERNATIVES:
-            name = ALTERNATIVES[given].name
-            value = np.asarray(ALTERNATIVES[given].convert(np.asarray(value, np.float64)))
+        if given in alternatives:
+            name = alternatives[given].instead_of
+            value = np.asarray(alternatives[given].convert(np.asarray(value, np.float64)))
             if name in (overrides or {}):
                 raise InputError(f"{material.name}: give {name} or {given}, not both")
         found[name] = value

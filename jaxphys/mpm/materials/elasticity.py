@@ -8,26 +8,35 @@ from jax import Array
 from jaxphys.core import algebra
 from jaxphys.core.spectral import left_isotropic, left_strain, polar_rotation, volume_change
 from jaxphys.mpm.materials.law import Law, Parameters
+from jaxphys.mpm.materials.parameters import POISSON_RATIO, YOUNGS_MODULUS
 
-ELASTIC_PARAMETERS = ("youngs_modulus", "poisson_ratio")
+ELASTIC_PARAMETERS = (YOUNGS_MODULUS, POISSON_RATIO)
 MODULI = ("shear_modulus", "first_lame_parameter")
 
 
 def lame(parameters: Parameters) -> tuple[Array, Array]:
-    """Shear modulus mu and Lame's first parameter lambda [Pa] from `youngs_modulus` [Pa] and
-    `poisson_ratio`, or as `with_moduli` has worked them out.
+    """Shear modulus mu and Lame's first parameter lambda [Pa] as `with_moduli` has worked them out,
+    or from `youngs_modulus` [Pa] and `poisson_ratio`, or `bulk_modulus` and `shear_modulus` [Pa].
     """
-    if MODULI[0] in parameters:
+    if MODULI[1] in parameters:
         return parameters[MODULI[0]], parameters[MODULI[1]]
+    if "bulk_modulus" in parameters:
+        mu = parameters["shear_modulus"]
+        return mu, parameters["bulk_modulus"] - 2 / 3 * mu
     E, nu = parameters["youngs_modulus"], parameters["poisson_ratio"]
     return E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
 
 
 def with_moduli(parameters: Parameters) -> Parameters:
     """Parameters with the moduli that `lame` gives, so that no step works them out again."""
-    if not set(ELASTIC_PARAMETERS) <= set(parameters):
-        return parameters
     return parameters | dict(zip(MODULI, lame(parameters), strict=True))
+
+
+def elastic_rest(parameters: Parameters) -> tuple[Array, Array]:
+    """(wave, lone) moduli at rest [Pa] of every law that is linear elasticity at small strains."""
+    mu, lam = lame(parameters)
+    # For nu < 0 shearing is the stiffer motion.
+    return lam + 2 * mu, 2 * mu + 3 * jnp.maximum(lam, 0)
 
 
 def add_to_diagonal(A: Array, value: Array) -> Array:
@@ -141,12 +150,12 @@ def without_memory(energy):
 
 
 def _elastic(name, stress, energy, principal_energy, spectral=False) -> Law:
-    def update(parameters, F_trial, history):
+    def update(parameters, F_trial, history, dt):
         return F_trial, stress(parameters, F_trial), history
 
     return Law(
         name=name,
-        parameters=ELASTIC_PARAMETERS,
+        declared=ELASTIC_PARAMETERS,
         history=(),
         history_names=(),
         update=update,
@@ -154,6 +163,8 @@ def _elastic(name, stress, energy, principal_energy, spectral=False) -> Law:
         principal_energy=principal_energy,
         plastic=False,
         spectral=spectral,
+        prepare=with_moduli,
+        rest=elastic_rest,
     )
 
 

@@ -11,12 +11,18 @@ from jaxphys.core.parts import connected_parts
 from jaxphys.core.spectral import left_isotropic
 from jaxphys.mpm.materials.elasticity import (
     ELASTIC_PARAMETERS,
+    elastic_rest,
     hencky_density,
     hencky_principal_energy,
+    hencky_principal_stress,
     lame,
+    with_moduli,
 )
 from jaxphys.mpm.materials.law import Law, Parameters
+from jaxphys.mpm.materials.parameters import Parameter
 from jaxphys.mpm.materials.plasticity import (
+    FRICTION_ANGLE,
+    PLANE_STRAIN,
     apply_change,
     drucker_prager_values,
     friction_coefficient,
@@ -38,6 +44,11 @@ def damage_of_strain(strain: Array, fracture_strain: Array, softening_strain: Ar
 def _tension_and_compression(e: Array):
     total = e[0] + e[1] + e[2]
     return jnp.maximum(e, 0), jnp.minimum(e, 0), jnp.maximum(total, 0), jnp.minimum(total, 0)
+
+
+def _damaged_stress(mu: Array, lam: Array, damage: Array, e: Array) -> Array:
+    stretch, squeeze, swelling, shrinking = _tension_and_compression(e)
+    return (1 - damage) * (2 * mu * stretch + lam * swelling) + (2 * mu * squeeze + lam * shrinking)
 
 
 def fracture_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
@@ -62,10 +73,7 @@ def fracture_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple[Arr
     mu, lam, fracture_strain, softening_strain, alpha, damage, kept_volume = arguments
     largest = jnp.maximum(jnp.maximum(e[0], e[1]), e[2])
     damage = jnp.maximum(damage, damage_of_strain(largest, fracture_strain, softening_strain))
-    stretch, squeeze, swelling, shrinking = _tension_and_compression(e)
-    stress = (1 - damage) * (2 * mu * stretch + lam * swelling) + (
-        2 * mu * squeeze + lam * shrinking
-    )
+    stress = _damaged_stress(mu, lam, damage, e)
     (rubble_change, rubble_stress), (volume,) = drucker_prager_values(
         e, (mu, lam, alpha, kept_volume)
     )
@@ -77,7 +85,7 @@ def fracture_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple[Arr
     )
 
 
-def _fracture_update(parameters: Parameters, F_trial: Array, history: Array):
+def _fracture_update(parameters: Parameters, F_trial: Array, history: Array, dt: Array):
     arguments = (
         *lame(parameters),
         parameters["fracture_strain"],
@@ -88,6 +96,20 @@ def _fracture_update(parameters: Parameters, F_trial: Array, history: Array):
     )
     (change, stress), kept = left_isotropic(fracture_values, F_trial, arguments)
     return apply_change(change, F_trial), stress, jnp.stack(kept)
+
+
+def _trial_values(e, arguments):
+    mu, lam, damage = arguments
+    rubble = hencky_principal_stress(mu, lam, e)
+    return (jnp.where(damage >= 1, rubble, _damaged_stress(mu, lam, damage, e)),), ()
+
+
+def fracture_trial(parameters: Parameters, F: Array, history: Array) -> Array:
+    """Kirchhoff stress (3, 3, ...) [Pa] with the damage as it is: the derivative of
+    `fracture_energy` by F.
+    """
+    ((stress,), _) = left_isotropic(_trial_values, F, (*lame(parameters), history[0]))
+    return stress
 
 
 def _energy_value(e, arguments):
@@ -109,12 +131,17 @@ def fracture_energy(parameters: Parameters, F: Array, history: Array) -> Array:
 
 FRACTURE = Law(
     name="fracture",
-    parameters=(
+    declared=(
         *ELASTIC_PARAMETERS,
-        "fracture_strain",
-        "softening_strain",
-        "friction_angle",
+        Parameter(
+            "fracture_strain",
+            "largest principal strain at which tension starts to fall",
+            "log strain",
+        ),
+        Parameter("softening_strain", "further strain at which all tension is gone", "log strain"),
+        FRICTION_ANGLE,
     ),
+    alternatives=(PLANE_STRAIN,),
     history=(0.0, 0.0),
     history_names=("damage", "kept_log_volume"),
     update=_fracture_update,
@@ -123,6 +150,9 @@ FRACTURE = Law(
     plastic=True,
     spectral=True,
     breaks=True,
+    trial=fracture_trial,
+    prepare=with_moduli,
+    rest=elastic_rest,
 )
 
 

@@ -1,36 +1,47 @@
-"""What each parameter of a material means, in which unit and range: declared once, for checks,
-listings and messages.
+"""What a parameter of a law is, and those that several laws share: a meaning is declared once, for
+checks, listings and messages.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
+from math import inf
+from typing import Any
 
 import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.materials.plasticity import triaxial_friction_angle
 
 
 @dataclass(frozen=True)
-class Range:
-    """What a parameter means and where it may lie.
+class Parameter:
+    """A number that a law reads of every particle: what it means and where it may lie.
 
     Attributes:
-        meaning: in words; of which test, where that matters.
-        text: the range as a user reads it.
-        unit: of SI, or degrees.
-        low, high: its ends.
-        low_included: whether `low` itself is allowed.
+        name: as scenes and `Simulation.with_` give it.
+        meaning: one line, in words; of which test, where that matters.
+        unit: of SI, or degrees; empty for a pure number.
+        low, high: the ends of its range.
+        low_included: whether `low` itself is allowed; `high` never is.
     """
 
+    name: str
     meaning: str
-    text: str
     unit: str
-    low: float
-    high: float
+    low: float = 0.0
+    high: float = inf
     low_included: bool = False
+
+    @property
+    def text(self) -> str:
+        """The range as a user reads it."""
+        if self.low == -inf:
+            return "any number" if self.high == inf else f"< {self.high:g}"
+        if self.high == inf:
+            return f"{'>=' if self.low_included else '>'} {self.low:g}"
+        if self.low_included:
+            return f"in [{self.low:g}, {self.high:g})"
+        return f"between {self.low:g} and {self.high:g}, both excluded"
 
     def contains(self, values: np.ndarray) -> np.ndarray:
         """Elementwise; what is not a number lies outside."""
@@ -40,92 +51,54 @@ class Range:
 
 @dataclass(frozen=True)
 class Alternative:
-    """Another way to give a parameter: `convert` turns it into the one called `name`."""
+    """Another way to give the parameter called `instead_of`, which `convert` makes of it."""
 
-    name: str
-    convert: Callable[[np.ndarray], Array]
+    parameter: Parameter
+    instead_of: str
+    convert: Callable[[Any], Array]
 
 
-INFINITY = float("inf")
-RANGES: Mapping[str, Range] = MappingProxyType(
-    {
-        "youngs_modulus": Range(
-            "stiffness: stress over strain of a bar that is pulled", "> 0", "Pa", 0, INFINITY
-        ),
-        "poisson_ratio": Range(
-            "how much a bar that is pulled gets thinner, over how much it gets longer; "
-            "0.5 would keep its volume",
-            "between -1 and 0.5, both excluded",
-            "",
-            -1,
-            0.5,
-        ),
-        "density": Range("mass over volume at rest", "> 0", "kg/m^3", 0, INFINITY),
-        "yield_stress": Range(
-            "stress at which a bar that is pulled starts to stay longer (uniaxial, as handbooks "
-            "list it); in shear 0.58 of it",
-            "> 0",
-            "Pa",
-            0,
-            INFINITY,
-        ),
-        "hardening": Range(
-            "by how much that stress grows for each unit of plastic strain of the bar "
-            "(isotropic, linear)",
-            ">= 0",
-            "Pa",
-            0,
-            INFINITY,
-            low_included=True,
-        ),
-        "friction_angle": Range(
-            "angle of internal friction in triaxial compression, as laboratories measure it; in "
-            "plane strain the same grains slide later, at 43.9 for 30",
-            "in [0, 90)",
-            "degrees",
-            0,
-            90,
-            low_included=True,
-        ),
-        "plane_strain_friction_angle": Range(
-            "angle of internal friction in plane strain: of long slopes and of two-dimensional "
-            "theory",
-            "in [0, 90)",
-            "degrees",
-            0,
-            90,
-            low_included=True,
-        ),
-        "fracture_strain": Range(
-            "largest principal strain at which tension starts to fall",
-            "> 0",
-            "log strain",
-            0,
-            INFINITY,
-        ),
-        "softening_strain": Range(
-            "further strain at which all tension is gone", "> 0", "log strain", 0, INFINITY
-        ),
-    }
+DENSITY = Parameter("density", "mass over volume at rest", "kg/m^3")
+YOUNGS_MODULUS = Parameter(
+    "youngs_modulus", "stiffness: stress over strain of a bar that is pulled", "Pa"
 )
-ALTERNATIVES: Mapping[str, Alternative] = MappingProxyType(
-    {"plane_strain_friction_angle": Alternative("friction_angle", triaxial_friction_angle)}
+POISSON_RATIO = Parameter(
+    "poisson_ratio",
+    "how much a bar that is pulled gets thinner, over how much it gets longer; 0.5 would keep its "
+    "volume",
+    "",
+    low=-1,
+    high=0.5,
+)
+BULK_MODULUS = Parameter(
+    "bulk_modulus",
+    "pressure over the share of volume that it takes away; a hundred times density times the "
+    "square of the fastest speed is as good as water's 2.2e9 to the eye",
+    "Pa",
+)
+SHEAR_MODULUS = Parameter(
+    "shear_modulus", "stiffness against a change of shape: shear stress over shear angle", "Pa"
+)
+YIELD_STRESS = Parameter(
+    "yield_stress",
+    "stress at which a bar that is pulled starts to stay longer (uniaxial, as handbooks list it); "
+    "in shear 0.58 of it",
+    "Pa",
 )
 
 
-def check_parameter(name: str, value, where: str) -> None:
-    """Refuses a value, a number or an array, any entry of which lies outside the range of the
-    parameter `name`.
+def check_parameter(parameter: Parameter, value, where: str) -> None:
+    """Refuses a value, a number or an array, any entry of which lies outside of the range.
 
     Raises:
-        InputError: with `where`, the worst entry, and the range.
+        InputError: with `where`, the first entry that does, and the range.
     """
     values = np.asarray(value, dtype=np.float64).reshape(-1)
-    allowed = RANGES[name]
-    wrong = np.flatnonzero(~allowed.contains(values))
+    wrong = np.flatnonzero(~parameter.contains(values))
     if wrong.size:
         entry = f"[{wrong[0]}]" if values.size > 1 else ""
-        unit = f" {allowed.unit}" if allowed.unit else ""
+        unit = f" {parameter.unit}" if parameter.unit else ""
         raise InputError(
-            f"{where}: {name}{entry} is {values[wrong[0]]:g}{unit}, must be {allowed.text}"
+            f"{where}: {parameter.name}{entry} is {values[wrong[0]]:g}{unit}, must be "
+            f"{parameter.text}"
         )

@@ -21,13 +21,16 @@ from jaxphys.core.program import part
 from jaxphys.core.spectral import left_isotropic
 from jaxphys.mpm.materials.elasticity import (
     ELASTIC_PARAMETERS,
+    elastic_rest,
     hencky_energy,
     hencky_principal_energy,
     hencky_principal_stress,
     lame,
+    with_moduli,
     without_memory,
 )
 from jaxphys.mpm.materials.law import Law, Parameters
+from jaxphys.mpm.materials.parameters import YIELD_STRESS, Alternative, Parameter
 
 # sqrt(3/2) |dev tau| is the stress of a uniaxial test, sqrt(2/3) |plastic strain| its plastic
 # strain.
@@ -47,7 +50,8 @@ def split_deviator(e: Array) -> tuple[Array, Array, Array]:
     return total, deviator, norm
 
 
-def _unit(deviator: Array, norm: Array) -> Array:
+def unit_deviator(deviator: Array, norm: Array) -> Array:
+    """The direction (3, ...) of a deviator of that norm; zero where it has none."""
     return deviator / jnp.where(norm > 0, norm, 1)
 
 
@@ -89,11 +93,11 @@ def _onto_cylinder(e: Array, mu: Array, lam: Array, radius: Array, resistance: A
     _, deviator, norm = split_deviator(e)
     excess = 2 * mu * norm - radius
     flow = jnp.where(excess > 0, excess / resistance, 0)
-    change = -flow * _unit(deviator, norm)
+    change = -flow * unit_deviator(deviator, norm)
     return (jnp.expm1(change), hencky_principal_stress(mu, lam, e + change)), flow
 
 
-def _von_mises_update(parameters: Parameters, F_trial: Array, history: Array):
+def _von_mises_update(parameters: Parameters, F_trial: Array, history: Array, dt: Array):
     plastic_strain, hardening = history[0], parameters["hardening"]
     strength = parameters["yield_stress"] + hardening * plastic_strain
     arguments = (*lame(parameters), UNIAXIAL * strength, UNIAXIAL**2 * hardening)
@@ -101,7 +105,7 @@ def _von_mises_update(parameters: Parameters, F_trial: Array, history: Array):
     return apply_change(change, F_trial), stress, (plastic_strain + UNIAXIAL * flow)[None]
 
 
-def _perfect_update(parameters: Parameters, F_trial: Array, history: Array):
+def _perfect_update(parameters: Parameters, F_trial: Array, history: Array, dt: Array):
     arguments = (*lame(parameters), UNIAXIAL * parameters["yield_stress"])
     (change, stress), _ = left_isotropic(perfect_values, F_trial, arguments)
     return apply_change(change, F_trial), stress, history
@@ -155,7 +159,7 @@ def triaxial_friction_angle(plane_strain_angle: Array | np.ndarray) -> Array:
 def _cone(total: Array, deviator: Array, norm: Array, mu: Array, lam: Array, alpha: Array):
     """Whether nothing holds, and the change of log strains that slides back onto the cone."""
     excess = norm + (3 * lam + 2 * mu) / (2 * mu) * total * alpha
-    return total > 0, -jnp.where(excess > 0, excess, 0) * _unit(deviator, norm)
+    return total > 0, -jnp.where(excess > 0, excess, 0) * unit_deviator(deviator, norm)
 
 
 def uncorrected_values(e: Array, arguments) -> tuple[tuple[Array, Array], tuple]:
@@ -198,7 +202,7 @@ def drucker_prager_values(e: Array, arguments) -> tuple[tuple[Array, Array], tup
     return (jnp.expm1(change), stress), (jnp.where(apart, total, 0),)
 
 
-def _drucker_prager_update(parameters: Parameters, F_trial: Array, history: Array):
+def _drucker_prager_update(parameters: Parameters, F_trial: Array, history: Array, dt: Array):
     arguments = (
         *lame(parameters),
         friction_coefficient(parameters["friction_angle"]),
@@ -208,15 +212,40 @@ def _drucker_prager_update(parameters: Parameters, F_trial: Array, history: Arra
     return apply_change(change, F_trial), stress, volume[None]
 
 
-def _uncorrected_update(parameters: Parameters, F_trial: Array, history: Array):
+def _uncorrected_update(parameters: Parameters, F_trial: Array, history: Array, dt: Array):
     arguments = (*lame(parameters), friction_coefficient(parameters["friction_angle"]))
     (change, stress), _ = left_isotropic(uncorrected_values, F_trial, arguments)
     return apply_change(change, F_trial), stress, history
 
 
+HARDENING = Parameter(
+    "hardening",
+    "by how much that stress grows for each unit of plastic strain of the bar (isotropic, linear)",
+    "Pa",
+    low_included=True,
+)
+FRICTION_ANGLE = Parameter(
+    "friction_angle",
+    "angle of internal friction in triaxial compression, as laboratories measure it; in plane "
+    "strain the same grains slide later, at 43.9 for 30",
+    "degrees",
+    high=90,
+    low_included=True,
+)
+PLANE_STRAIN = Alternative(
+    Parameter(
+        "plane_strain_friction_angle",
+        "angle of internal friction in plane strain: of long slopes and of two-dimensional theory",
+        "degrees",
+        high=90,
+        low_included=True,
+    ),
+    "friction_angle",
+    triaxial_friction_angle,
+)
 PERFECT_VON_MISES = Law(
     name="von Mises without hardening",
-    parameters=(*ELASTIC_PARAMETERS, "yield_stress"),
+    declared=(*ELASTIC_PARAMETERS, YIELD_STRESS),
     history=(),
     history_names=(),
     update=_perfect_update,
@@ -224,11 +253,13 @@ PERFECT_VON_MISES = Law(
     principal_energy=hencky_principal_energy,
     plastic=True,
     spectral=True,
+    prepare=with_moduli,
+    rest=elastic_rest,
     omits=("hardening",),
 )
 VON_MISES = Law(
     name="von Mises",
-    parameters=(*ELASTIC_PARAMETERS, "yield_stress", "hardening"),
+    declared=(*ELASTIC_PARAMETERS, YIELD_STRESS, HARDENING),
     history=(0.0,),
     history_names=("equivalent_plastic_strain",),
     update=_von_mises_update,
@@ -236,11 +267,14 @@ VON_MISES = Law(
     principal_energy=hencky_principal_energy,
     plastic=True,
     spectral=True,
+    prepare=with_moduli,
+    rest=elastic_rest,
     without=(("hardening", PERFECT_VON_MISES),),
 )
 DRUCKER_PRAGER = Law(
     name="Drucker-Prager",
-    parameters=(*ELASTIC_PARAMETERS, "friction_angle"),
+    declared=(*ELASTIC_PARAMETERS, FRICTION_ANGLE),
+    alternatives=(PLANE_STRAIN,),
     history=(0.0,),
     history_names=("kept_log_volume",),
     update=_drucker_prager_update,
@@ -248,10 +282,13 @@ DRUCKER_PRAGER = Law(
     principal_energy=hencky_principal_energy,
     plastic=True,
     spectral=True,
+    prepare=with_moduli,
+    rest=elastic_rest,
 )
 UNCORRECTED_DRUCKER_PRAGER = Law(
     name="Drucker-Prager without volume correction",
-    parameters=(*ELASTIC_PARAMETERS, "friction_angle"),
+    declared=(*ELASTIC_PARAMETERS, FRICTION_ANGLE),
+    alternatives=(PLANE_STRAIN,),
     history=(),
     history_names=(),
     update=_uncorrected_update,
@@ -259,4 +296,6 @@ UNCORRECTED_DRUCKER_PRAGER = Law(
     principal_energy=hencky_principal_energy,
     plastic=True,
     spectral=True,
+    prepare=with_moduli,
+    rest=elastic_rest,
 )

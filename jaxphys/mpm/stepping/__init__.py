@@ -1,1 +1,6 @@
-"""Which times a simulation steps to."""
+"""Which times a simulation steps to. A stepping is a frozen value; `loop` has the loop of each."""
+
+from .adaptive import Adaptive as Adaptive
+from .fixed import Fixed as Fixed
+
+Stepping = Fixed | Adaptive

@@ -1,6 +1,7 @@
 """How long a time step may be: bounds from the state, and a check of a step that was given."""
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import jax
@@ -11,24 +12,33 @@ from jax import Array
 from jaxphys.core import algebra
 from jaxphys.core.errors import InputError
 from jaxphys.core.spectral import left_strain
-from jaxphys.mpm.materials.elasticity import lame
 from jaxphys.mpm.materials.law import Law, Parameters
+from jaxphys.mpm.transfer.kernels import KernelName
+from jaxphys.mpm.transfer.schemes import Transfer
 
 ADVECTION = 0.5
 GRADIENT = 0.2
 SAFETY = 0.8
 # A particle alone may swing out from a strain a to sqrt(a^2 + SWING^2), or sqrt(3 / 2) a if less.
 SWING = 0.007
+# Cells that a wave may cross in a step, without and with affine velocities: where particles are one
+# a cell, the worst case. More of them allow more, and the blend with FLIP takes nothing away.
+SOUND: dict[KernelName, tuple[float, float]] = {
+    "quadratic": (math.sqrt(0.5), 1.0),
+    "cubic": (1.13, 1.39),
+}
+DEFAULT = Transfer()
 
 
 class StepBounds(NamedTuple):
     """Upper bounds of the time step [s], arrays () or numbers, and the step to take.
 
     Attributes:
-        sound: a wave may not cross more than a cell.
+        sound: a wave may not cross more than a cell, or what else the transfer allows.
         isolated: a particle alone may not overshoot.
         advection: a particle may not cross more than half a cell, after a fall through the domain.
         gradient: the deformation may not change by more than a fifth.
+        viscous: what flows may not be slowed beyond rest.
         contact: what touches a boundary may not overshoot.
         dt: the smallest of them times the safety factor.
     """
@@ -37,6 +47,7 @@ class StepBounds(NamedTuple):
     isolated: Array | float
     advection: Array | float
     gradient: Array | float
+    viscous: Array | float
     contact: Array | float
     dt: Array | float
 
@@ -65,8 +76,12 @@ def moduli(law: Law, parameters: Parameters, s: Array) -> tuple[Array, Array]:
     s_j^2) r_ij of shearing. At s = 1 it is the larger of 2 mu + 3 lambda and 2 mu.
     """
 
+    energy = law.principal_energy
+    if energy is None:
+        raise InputError(f"law {law.name}: has neither a principal energy nor moduli of its own")
+
     def slope(s):
-        return jax.grad(lambda x: jnp.sum(law.principal_energy(parameters, x)))(s)
+        return jax.grad(lambda x: jnp.sum(energy(parameters, x)))(s)
 
     axes = np.eye(3, dtype=s.dtype).reshape(3, 3, *[1] * (s.ndim - 1))
     directions = jnp.broadcast_to(axes, (3, *s.shape))
@@ -116,38 +131,94 @@ def principal_stretches(F: Array) -> Array:
     return jnp.sqrt(jnp.maximum(squares, 8 * jnp.finfo(F.dtype).eps))
 
 
-def rest_moduli(parameters: Parameters) -> tuple[Array, Array]:
-    """`moduli` at rest in closed form."""
-    mu, lam = lame(parameters)
-    # For nu < 0 shearing is the stiffer motion.
-    return lam + 2 * mu, 2 * mu + 3 * jnp.maximum(lam, 0)
+def moduli_of(law: Law, parameters: Parameters, F: Array) -> tuple[Array, Array]:
+    """(wave, lone) [Pa] of a law at deformation gradients F (3, 3, ...): its own, or `moduli`."""
+    if law.moduli is not None:
+        return law.moduli(parameters, F)
+    return moduli(law, parameters, principal_stretches(F))
 
 
-def _step_of(spacing: float, density: Array, modulus: Array) -> Array:
-    """dx sqrt(rho0 / modulus) [s]; unbounded for what has no mass, and so exerts no force."""
-    return jnp.where(density > 0, spacing * jnp.sqrt(density / modulus), jnp.inf)
+def rest_moduli(law: Law, parameters: Parameters, like: Array) -> tuple[Array, Array]:
+    """`moduli_of` a law at rest, each broadcast against `like` (...)."""
+    if law.rest is not None:
+        return law.rest(parameters)
+    return moduli_of(law, parameters, _same_in_all_directions(jnp.ones_like(like)))
+
+
+def _same_in_all_directions(stretch: Array) -> Array:
+    """F (3, 3, ...) of a body that is stretched by `stretch` (...) in every direction."""
+    return jnp.eye(3, dtype=stretch.dtype).reshape(3, 3, *[1] * stretch.ndim) * stretch
+
+
+def with_wave_modulus(config, model):
+    """The model with what contact must know of the laws: the wave modulus of every particle at
+    rest, `Model.wave_modulus`. Itself where there is no boundary to ask for it.
+    """
+    if not model.boundaries:
+        return model
+    found = [
+        jnp.broadcast_to(rest_moduli(law, parameters, density)[0], density.shape)
+        for law, parameters, _, density in _segments(config, model)
+    ]
+    return replace(model, wave_modulus=jnp.concatenate(found))
+
+
+def _step_of(length: float, density: Array, modulus: Array) -> Array:
+    """length sqrt(rho0 / modulus) [s]; unbounded for what has no mass, and so exerts no force."""
+    return jnp.where(density > 0, length * jnp.sqrt(density / modulus), jnp.inf)
+
+
+def sound_length(transfer: Transfer, spacing: float) -> float:
+    """How far a wave may run in a step [m]: the von Neumann limit.
+
+    dx for APIC with quadratic splines (Bai and Schroeder 2022, figure 4). The others are found
+    numerically, from the amplification of plane waves on a lattice (docs/transfer.md).
+    """
+    return spacing * SOUND[transfer.kernel][transfer.scheme.affine]
+
+
+def lone_length(transfer: Transfer, spacing: float) -> float:
+    """The length [m] over which a particle alone swings: its bound is this over sqrt(lone / rho0).
+
+    With k = `inverse_inertia`, a particle that shares its nodes with no other obeys C' = a C - dt
+    (k / dx^2) tau(F) / rho0 and F' = (I + dt C') F, whatever its velocity. With an affine part (a =
+    1) that is a leapfrog of the frequency w = sqrt(k lone / rho0) / dx, stable up to 2 / w: at rest
+    and with quadratic splines the bound of Bai and Schroeder (technical document, 3.12). Without
+    one a strain e becomes (1 - (w dt)^2) e, stable up to sqrt(2) / w.
+    """
+    swing = 2 * spacing / math.sqrt(transfer.spline.inverse_inertia)
+    return swing if transfer.scheme.affine else math.sqrt(0.5) * swing
 
 
 def present_bounds(
-    law: Law, parameters: Parameters, F: Array, density: Array, spacing: float
+    law: Law,
+    parameters: Parameters,
+    F: Array,
+    density: Array,
+    spacing: float,
+    transfer: Transfer = DEFAULT,
 ) -> tuple[Array, Array]:
-    """(sound, isolated) [s] of each particle as it is now deformed, (...).
-
-    sound: dx / c, the von Neumann limit of APIC with quadratic splines (Bai and Schroeder 2022,
-    figure 4). isolated: dx sqrt(rho0 / lone modulus). A particle that shares its nodes with no
-    other obeys C' = C - dt (4 / dx^2) tau(F) / rho0 and F' = (I + dt C') F, a leapfrog of the
-    frequency 2 / dx sqrt(lone / rho0), stable up to twice its inverse: at rest that is the bound of
-    Bai and Schroeder (technical document, 3.12).
+    """(sound, isolated) [s] of each particle as it is now deformed, (...): `sound_length` over the
+    speed of waves, `lone_length` over sqrt(lone modulus / rho0).
     """
-    present = moduli(law, parameters, principal_stretches(F))
+    present = moduli_of(law, parameters, F)
     # F F^T does not tell the moduli of a state that has lost its stiffness from those at rest.
-    largest = map(jnp.maximum, present, rest_moduli(parameters))
-    first, second = (_step_of(spacing, density, modulus) for modulus in largest)
+    largest = map(jnp.maximum, present, rest_moduli(law, parameters, density))
+    lengths = sound_length(transfer, spacing), lone_length(transfer, spacing)
+    first, second = (
+        _step_of(length, density, modulus) for length, modulus in zip(lengths, largest, strict=True)
+    )
     return first, second
 
 
 def isolated_bound(
-    law: Law, parameters: Parameters, F: Array, C: Array, density: Array, spacing: float
+    law: Law,
+    parameters: Parameters,
+    F: Array,
+    C: Array,
+    density: Array,
+    spacing: float,
+    transfer: Transfer = DEFAULT,
 ) -> Array:
     """How long a step may be for a particle that swings alone, [s], (...).
 
@@ -156,34 +227,72 @@ def isolated_bound(
     exp(e).
 
     At a share q of the limit of stability the leapfrog swings out to a / sqrt(1 - q^2) of an
-    amplitude a; a^2 is e^2 and what the strain rate adds, (|sym C| dx / 2)^2 rho0 / lone. The bound
-    lets it swing out to sqrt(a^2 + SWING^2), or to sqrt(3/2) a where that is less: q = 1 at rest,
-    which is the sharp limit, and q = 0.58 from an amplitude of a hundredth on.
+    amplitude a; a^2 is e^2 and what the strain rate adds, |sym C|^2 / w^2 with the frequency w of
+    `lone_length`. The bound lets it swing out to sqrt(a^2 + SWING^2), or to sqrt(3/2) a where that
+    is less: q = 1 at rest, which is the sharp limit, and q = 0.58 from an amplitude of a hundredth
+    on.
 
-    Nor may the energy psi that it holds, once it is all in its rate, rho0 dx^2 / 8 |C|^2, deform it
-    by more than GRADIENT a step: large rates let a swing leak from one direction into another.
+    Nor may the energy psi that it holds, once it is all in its rate, rho0 dx^2 / (2 k) |C|^2,
+    deform it by more than GRADIENT a step: large rates let a swing leak from one direction into
+    another.
+
+    Without an affine part it keeps no rate and swings out no further; the same shares of the
+    shorter limit are on the safe side.
     """
-    _, rest = rest_moduli(parameters)
+    _, rest = rest_moduli(law, parameters, density)
     rate = 0.5 * (C + algebra.transpose(C))
     s = principal_stretches(F)
     e = jnp.max(jnp.abs(jnp.log(s)), axis=0)
-    swing = e**2 + jnp.sum(rate**2, axis=(0, 1)) * spacing**2 / 4 * density / rest
-    squeezed, stretched = (
-        moduli(law, parameters, jnp.exp(jnp.stack([side * e] * 3)))[1] for side in (-1, 1)
-    )
+    k = transfer.spline.inverse_inertia
+    swing = e**2 + jnp.sum(rate**2, axis=(0, 1)) * spacing**2 / k * density / rest
+    squeezed, stretched = (_lone_at(law, parameters, jnp.exp(side * e)) for side in (-1, 1))
     modulus = jnp.maximum(rest, jnp.maximum(squeezed, stretched))
     modulus = modulus * (1 + jnp.minimum(swing / SWING**2, 2))
-    released = 8 / GRADIENT**2 * law.principal_energy(parameters, s)
-    return _step_of(spacing, density, jnp.maximum(modulus, released))
+    if law.principal_energy is not None:
+        energy = law.principal_energy(parameters, s)
+    elif law.energy is not None:
+        energy = law.energy(parameters, F, law.at_start(density))
+    else:
+        energy = jnp.zeros_like(density)
+    released = 8 / GRADIENT**2 * energy
+    return _step_of(lone_length(transfer, spacing), density, jnp.maximum(modulus, released))
 
 
-def _by_segment(config, model, function, *fields):
-    """`function(law, parameters, *fields, density, spacing)` of every segment."""
+def _lone_at(law: Law, parameters: Parameters, stretch: Array) -> Array:
+    """The lone modulus (...) [Pa] at the same stretch (...) in every direction."""
+    if law.moduli is not None:
+        return law.moduli(parameters, _same_in_all_directions(stretch))[1]
+    return moduli(law, parameters, jnp.stack([stretch] * 3))[1]
+
+
+def viscous_bound(
+    law: Law,
+    parameters: Parameters,
+    density: Array,
+    spacing: float,
+    transfer: Transfer = DEFAULT,
+) -> Array:
+    """rho0 dx^2 / (k eta) [s], (...), with k = `inverse_inertia`: a particle alone loses 2 k eta /
+    (rho0 dx^2) of its strain rate D a second, C' = a C - dt (k / dx^2) 2 eta D / rho0, and may not
+    lose it twice over in a step. Without an affine part (a = 0) it may not lose it more than once,
+    in half the step.
+    """
+    if law.viscosity is None:
+        return jnp.full_like(density, jnp.inf)
+    viscosity = law.viscosity(parameters)
+    flows = (density > 0) & (viscosity > 0)
+    k = transfer.spline.inverse_inertia * (1 if transfer.scheme.affine else 2)
+    return jnp.where(flows, density * spacing**2 / (k * jnp.where(flows, viscosity, 1)), jnp.inf)
+
+
+def _segments(config, model, history: Array | None = None):
+    """(law, parameters, slice, density) of every segment, hardened by a history (H, N)."""
     density = model.mass / jnp.where(model.mass > 0, model.volume, 1)
     for law, start, stop in config.segments:
         parameters = {name: model.parameters[name][start:stop] for name in law.parameters}
-        cut = (field[..., start:stop] for field in (*fields, density))
-        yield function(law, parameters, *cut, config.grid.spacing)
+        own = None if history is None else history[: len(law.history), start:stop]
+        parameters = law.present(law.prepare(parameters), own)
+        yield law, parameters, slice(start, stop), density[start:stop]
 
 
 def contact_bound(model, grid) -> Array:
@@ -194,19 +303,37 @@ def contact_bound(model, grid) -> Array:
     return 2 / jnp.sqrt(sum(rates, jnp.zeros((), model.mass.dtype)))
 
 
-def hard_limit(law: Law, parameters: Parameters, F: Array, density: Array, spacing: float) -> Array:
-    """The step [s] beyond which each particle is unstable as it is now, (...), contact apart."""
-    return jnp.minimum(*present_bounds(law, parameters, F, density, spacing))
+def hard_limit(
+    law: Law,
+    parameters: Parameters,
+    F: Array,
+    density: Array,
+    spacing: float,
+    transfer: Transfer = DEFAULT,
+) -> Array:
+    """The step [s] beyond which each particle is unstable as it is now, (...), contact apart.
+
+    parameters: those of the present history, `Law.present`.
+    """
+    bound = jnp.minimum(*present_bounds(law, parameters, F, density, spacing, transfer))
+    if law.viscosity is None:
+        return bound
+    return jnp.minimum(bound, viscous_bound(law, parameters, density, spacing, transfer))
 
 
 def fastest(config, model, state) -> Array:
-    """Largest speed [m/s], (), of a particle now or after a free fall to the end of the domain."""
+    """Largest speed [m/s], (), of a particle now, after a free fall to the end of the domain, or
+    once a boundary has met it: what is elastic leaves a surface at up to twice its speed.
+    """
     squared = jnp.sum(state.velocity**2, axis=0)
     if model.gravity is not None:
         ends = jnp.maximum(model.gravity * jnp.array(config.grid.extent, squared.dtype), 0)
         drop = jnp.sum(ends) - jnp.sum(model.gravity[:, None] * state.position, axis=0)
         squared = squared + 2 * jnp.maximum(drop, 0)
-    return jnp.sqrt(jnp.max(squared))
+    speed = jnp.sqrt(jnp.max(squared))
+    for boundary in model.boundaries:
+        speed = jnp.maximum(speed, 2 * boundary.fastest().astype(speed.dtype))
+    return speed
 
 
 def step_bounds(config, model, state, safety: float = SAFETY) -> StepBounds:
@@ -218,19 +345,24 @@ def step_bounds(config, model, state, safety: float = SAFETY) -> StepBounds:
         state: with `position`, `velocity` (3, N), `affine` and `deformation` (3, 3, N).
         safety: what share of the smallest bound to take.
     """
-    F, C = state.deformation, state.affine
-    present = _by_segment(config, model, present_bounds, F)
-    swings = _by_segment(config, model, isolated_bound, F, C)
+    F, C, spacing = state.deformation, state.affine, config.grid.spacing
+    sound, isolated, viscous = [], [], []
+    for law, parameters, own, density in _segments(config, model, state.history):
+        matter = (density, spacing, config.transfer)
+        sound.append(present_bounds(law, parameters, F[..., own], *matter)[0])
+        isolated.append(isolated_bound(law, parameters, F[..., own], C[..., own], *matter))
+        viscous.append(viscous_bound(law, parameters, *matter))
 
     def least(bounds):
         return jnp.min(jnp.stack([jnp.min(bound) for bound in bounds]))
 
     bounds = (
-        least(sound for sound, _ in present),
-        least(swings),
-        ADVECTION * config.grid.spacing / fastest(config, model, state),
+        least(sound),
+        least(isolated),
+        ADVECTION * spacing / fastest(config, model, state),
         GRADIENT / jnp.sqrt(jnp.max(jnp.sum(C**2, axis=(0, 1)))),
-        contact_bound(model, config.grid),
+        least(viscous),
+        contact_bound(with_wave_modulus(config, model), config.grid),
     )
     return StepBounds(*bounds, dt=safety * jnp.min(jnp.stack(bounds)))
 

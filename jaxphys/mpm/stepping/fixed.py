@@ -1,8 +1,11 @@
 """The time step: as large as the bounds allow, a whole number of them to a frame."""
 
 import math
+from dataclasses import dataclass
+from typing import ClassVar
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.fields import Checked
 from jaxphys.mpm.state import Config, Model, State
 from jaxphys.mpm.stepping.bounds import StepBounds, largest_stable_dt, validate_dt
 
@@ -10,6 +13,15 @@ from jaxphys.mpm.stepping.bounds import StepBounds, largest_stable_dt, validate_
 # frame that starts stiffer than its step allows fails.
 SAFETY = 0.75
 MOST_STEPS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Fixed(Checked):
+    """Equal steps, as short as the state at the start asks for; looked at again every frame, which
+    fails where they have become too long.
+    """
+
+    type: ClassVar[str] = "fixed"
 
 
 def choose_substep(

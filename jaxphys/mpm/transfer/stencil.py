@@ -1,11 +1,11 @@
-"""Where the 27 nodes of each particle are, with their weights."""
+"""Where the nodes of each particle are, with their weights."""
 
 from typing import NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
-from jaxphys.mpm.transfer.kernel import base_node, weights
+from jaxphys.mpm.transfer.kernels import QUADRATIC, Kernel
 
 Shape = tuple[int, int, int]
 
@@ -13,13 +13,15 @@ Shape = tuple[int, int, int]
 class Window(NamedTuple):
     """The part of a grid that is computed. Static.
 
-    shape: its nodes per axis; spacing: between nodes [m]; grid_shape: nodes of the whole grid. Its
-    first node, the origin (3,) int32, is a number and not a part of the program.
+    shape: its nodes per axis; spacing: between nodes [m]; grid_shape: nodes of the whole grid;
+    kernel: of the particles in it. Its first node, the origin (3,) int32, is a number and not a
+    part of the program.
     """
 
     shape: Shape
     spacing: float
     grid_shape: Shape
+    kernel: Kernel = QUADRATIC
 
     @property
     def nodes(self) -> int:
@@ -29,7 +31,7 @@ class Window(NamedTuple):
 
 
 class Stencil(NamedTuple):
-    """Where the 27 nodes of each particle are. Arrays (axis, node 0 to 2, N)."""
+    """Where the nodes of each particle are. Arrays (axis, node 0 to width - 1, N)."""
 
     row: Array  # (N,) int32, row number of the first node
     weight: Array  # w_k(x)
@@ -40,16 +42,18 @@ class Stencil(NamedTuple):
 
 def stencil(window: Window, origin: Array, position: Array) -> Stencil:
     """The stencils of particles (3, N) [m]; those outside of the window are clamped to it."""
-    shape, spacing, grid_shape = window
-    base = base_node(position, spacing, grid_shape)
+    shape, spacing, grid_shape, kernel = window
+    base = kernel.base_node(position, spacing, grid_shape)
     # Clamped for the sake of a particle outside the grid: flagged elsewhere, it must not throw its
     # neighbours about with weights of any size.
-    offset = jnp.clip(position / spacing - base.astype(position.dtype), 0.5, 1.5)
+    offset = jnp.clip(
+        position / spacing - base.astype(position.dtype), kernel.reach, kernel.reach + 1
+    )
     local = base
     if shape != grid_shape:
-        last = jnp.array(shape, dtype=jnp.int32)[:, None] - 3
+        last = jnp.array(shape, dtype=jnp.int32)[:, None] - kernel.width
         local = jnp.clip(base - origin[:, None], 0, last)
     row = (local[0] * shape[1] + local[1]) * shape[2] + local[2]
-    weight, slope, distance = weights(offset)
+    weight, slope, distance = kernel.weights(offset)
     distance = distance * spacing
     return Stencil(row, weight, weight * distance, slope / spacing, distance)

@@ -8,6 +8,7 @@ from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEA
 
 LAWS = [NEO_HOOKEAN, FIXED_COROTATED, HENCKY]
 E, NU = 1.3, 0.3
+DT = 1e-3
 VALUES = {"youngs_modulus": jnp.asarray(E), "poisson_ratio": jnp.asarray(NU)}
 MU, LAM = (float(x) for x in elasticity.lame(VALUES))
 NONE = jnp.zeros((0, 1))  # no history
@@ -17,7 +18,7 @@ SAMPLES[:, :, 1] = np.diag([1.2, 1.2, 0.9])
 
 
 def stress(law, F, values=VALUES):
-    return law.update(values, F, jnp.zeros((0, F.shape[-1]), F.dtype))[1]
+    return law.update(values, F, jnp.zeros((0, F.shape[-1]), F.dtype), DT)[1]
 
 
 @pytest.mark.parametrize("law", LAWS, ids=repr)
@@ -85,6 +86,16 @@ def test_fixed_corotated_pushes_an_inverted_particle_back():
         stress(FIXED_COROTATED, F)[:, :, 0], (P[:, :, 0] @ F[:, :, 0].T), atol=1e-14
     )
     assert P[2, 2, 0] < 0  # growing F_zz, towards 1, lowers the energy
+
+
+def test_which_laws_can_be_pressed_to_nothing():
+    """Fixed corotated stores mu + lambda / 2 in a sheet; the others ever more, like log(J)^2."""
+    sheets = jnp.asarray(np.stack([[1, 1, 1e-6], [1, 1, 1e-12]], axis=-1))
+    flat = FIXED_COROTATED.principal_energy(VALUES, sheets)
+    np.testing.assert_allclose(flat, MU + LAM / 2, rtol=1e-5)
+    for law in (NEO_HOOKEAN, HENCKY):
+        once, twice = law.principal_energy(VALUES, sheets)
+        assert twice > 2.5 * once > 50 * (MU + LAM / 2)
 
 
 def test_neo_hookean_reports_inversion_as_not_a_number():

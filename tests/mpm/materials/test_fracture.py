@@ -7,6 +7,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.mpm.materials.elasticity import HENCKY, lame
 from jaxphys.mpm.materials.fracture import FRACTURE, damage_of_strain, number_of_pieces
 
+DT = 1e-3
 VALUES = {
     "youngs_modulus": jnp.asarray(1.0),
     "poisson_ratio": jnp.asarray(0.2),
@@ -21,17 +22,17 @@ def update(strains, damage=0.0, volume=0.0):
     """Elastic log strains, principal stress and history after one trial strain."""
     F = jnp.asarray(np.diag(np.exp(strains))[:, :, None])
     history = jnp.asarray([[damage], [volume]])
-    F, tau, history = FRACTURE.update(VALUES, F, history)
+    F, tau, history = FRACTURE.update(VALUES, F, history, DT)
     return np.log(np.diag(F[:, :, 0])), np.diag(tau[:, :, 0]), history[:, 0]
 
 
 def test_below_the_threshold_it_is_hencky_elasticity():
     random = np.random.default_rng(81)
     F = jnp.asarray(np.eye(3)[:, :, None] + 0.01 * random.normal(size=(3, 3, 10)))
-    kept, tau, damage = FRACTURE.update(VALUES, F, jnp.zeros((2, 10)))
+    kept, tau, damage = FRACTURE.update(VALUES, F, jnp.zeros((2, 10)), DT)
     np.testing.assert_array_equal(kept, F)
     np.testing.assert_array_equal(damage, 0)
-    np.testing.assert_allclose(tau, HENCKY.update(VALUES, F, jnp.zeros((0, 10)))[1], atol=1e-16)
+    np.testing.assert_allclose(tau, HENCKY.update(VALUES, F, jnp.zeros((0, 10)), DT)[1], atol=1e-16)
 
 
 def test_tension_falls_along_a_line_and_ends():
@@ -96,7 +97,7 @@ def test_stress_is_the_derivative_of_the_energy_that_damage_leaves():
     trial[:, :, 11] += 0.04 * np.eye(3)
     damage = np.array([*np.linspace(0, 0.9, 10), 1, 1])
     history = jnp.stack([jnp.asarray(damage), jnp.zeros(12)])
-    F, tau, history = FRACTURE.update(VALUES, jnp.asarray(trial), history)
+    F, tau, history = FRACTURE.update(VALUES, jnp.asarray(trial), history, DT)
     energy = FRACTURE.energy(VALUES, F, history)
     P = jax.grad(lambda F: jnp.sum(FRACTURE.energy(VALUES, F, history)))(F)
     np.testing.assert_allclose(tau, jnp.einsum("ikn,jkn->ijn", P, F), atol=1e-14)
@@ -116,7 +117,7 @@ def test_gradients_against_central_differences():
 
     @jax.jit
     def loss(F, values):
-        parts = FRACTURE.update(values, F, damage)
+        parts = FRACTURE.update(values, F, damage, DT)
         return sum(jnp.sum(w * x) for w, x in zip(weights, parts, strict=True))
 
     gF, gv = jax.jit(jax.grad(loss, (0, 1)))(F, VALUES)

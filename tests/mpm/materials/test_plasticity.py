@@ -14,6 +14,7 @@ from jaxphys.mpm.materials.plasticity import (
     triaxial_friction_angle,
 )
 
+DT = 1e-3
 METAL = {"youngs_modulus": 1.0, "poisson_ratio": 0.3, "yield_stress": 0.05, "hardening": 0.2}
 SAND = {"youngs_modulus": 1.0, "poisson_ratio": 0.3, "friction_angle": 35.0}
 CASES = [(VON_MISES, METAL), (DRUCKER_PRAGER, SAND)]
@@ -31,7 +32,7 @@ MU, LAM = (float(x) for x in lame(arrays(METAL)))
 def principal(law, values, strains, kept=0.0):
     """Elastic log strains, principal stresses and history after an update of diag(exp(strains))."""
     F = jnp.asarray(np.diag(np.exp(strains))[:, :, None])
-    F, tau, history = law.update(arrays(values), F, jnp.full((1, 1), kept))
+    F, tau, history = law.update(arrays(values), F, jnp.full((1, 1), kept), DT)
     assert np.abs(F[:, :, 0] - np.diag(np.diag(F[:, :, 0]))).max() < 1e-14
     return np.log(np.diag(F[:, :, 0])), np.diag(tau[:, :, 0]), float(history[0, 0])
 
@@ -80,7 +81,7 @@ def test_a_bar_pulled_in_small_steps():
     for plastic in np.linspace(0, 0.3, 31):
         total, stress = pulled(plastic, METAL)
         F = jnp.asarray(np.diag(np.exp(total - before)))[:, :, None] * F
-        F, tau, history = update(values, F, history)
+        F, tau, history = update(values, F, history, DT)
         before = total
         np.testing.assert_allclose(np.diag(tau[:, :, 0]), [stress, 0, 0], atol=1e-12)
         assert float(history[0, 0]) == pytest.approx(plastic, abs=1e-12)
@@ -93,8 +94,8 @@ def test_metal_without_hardening_is_the_same_without_its_memory():
     mixed = METAL | {"hardening": np.array([0.0, 0.1])}
     assert VON_MISES.reduced(mixed) is VON_MISES
     F = jnp.asarray(samples())
-    full, tau, _ = VON_MISES.update(arrays(values), F, jnp.full((1, 30), 0.3))
-    kept, same, history = PERFECT_VON_MISES.update(arrays(values), F, jnp.zeros((0, 30)))
+    full, tau, _ = VON_MISES.update(arrays(values), F, jnp.full((1, 30), 0.3), DT)
+    kept, same, history = PERFECT_VON_MISES.update(arrays(values), F, jnp.zeros((0, 30)), DT)
     np.testing.assert_allclose(kept, full, atol=1e-15)
     np.testing.assert_allclose(same, tau, atol=1e-15)
     assert history.shape == (0, 30)
@@ -123,7 +124,7 @@ def test_von_mises_simple_shear_strength():
     advance = jnp.eye(3).at[0, 1].set(2e-3)
     for _ in range(100):
         F = jnp.einsum("ij,jkn->ikn", advance, F)
-        F, tau, history = VON_MISES.update(values, F, history)
+        F, tau, history = VON_MISES.update(values, F, history, DT)
     assert float(tau[0, 1, 0]) == pytest.approx(METAL["yield_stress"] / np.sqrt(3), rel=1e-2)
     assert float(history[0, 0]) > 0.05
 
@@ -133,8 +134,8 @@ def test_von_mises_simple_shear_strength():
 def test_return_maps_are_idempotent(law, values, dtype):
     F = jnp.asarray(samples(), dtype)
     update = jax.jit(law.update)
-    first = update(arrays(values, dtype), F, jnp.zeros((1, F.shape[-1]), dtype))
-    again = update(arrays(values, dtype), first[0], first[2])
+    first = update(arrays(values, dtype), F, jnp.zeros((1, F.shape[-1]), dtype), DT)
+    again = update(arrays(values, dtype), first[0], first[2], DT)
     eps = np.finfo(dtype).eps
     for a, b in zip(first, again, strict=True):
         assert a.dtype == dtype
@@ -145,7 +146,7 @@ def test_return_maps_are_idempotent(law, values, dtype):
 @pytest.mark.parametrize(("law", "values"), CASES, ids=IDS)
 def test_stress_is_the_derivative_of_the_energy_of_what_is_left(law, values):
     values = arrays(values)
-    F, tau, _ = law.update(values, jnp.asarray(samples()), jnp.zeros((1, 30)))
+    F, tau, _ = law.update(values, jnp.asarray(samples()), jnp.zeros((1, 30)), DT)
     P = jax.grad(lambda F: jnp.sum(law.energy(values, F, KEPT)))(F)
     np.testing.assert_allclose(tau, jnp.einsum("ikn,jkn->ijn", P, F), atol=1e-13)
     assert (law.energy(values, F, KEPT) >= 0).all()
@@ -154,7 +155,7 @@ def test_stress_is_the_derivative_of_the_energy_of_what_is_left(law, values):
 @pytest.mark.parametrize(("law", "values"), CASES, ids=IDS)
 def test_plastic_flow_does_not_raise_the_energy(law, values):
     trial = jnp.asarray(samples())
-    F, _, _ = law.update(arrays(values), trial, jnp.zeros((1, 30)))
+    F, _, _ = law.update(arrays(values), trial, jnp.zeros((1, 30)), DT)
     values = arrays(values)
     assert (law.energy(values, F, KEPT) <= law.energy(values, trial, KEPT) + 1e-15).all()
 
@@ -162,7 +163,7 @@ def test_plastic_flow_does_not_raise_the_energy(law, values):
 def test_metal_below_yield_keeps_its_gradient_bit_for_bit():
     F = jnp.asarray(samples(size=0.002), jnp.float32)
     kept, _, history = VON_MISES.update(
-        arrays(METAL, jnp.float32), F, jnp.zeros((1, 30), jnp.float32)
+        arrays(METAL, jnp.float32), F, jnp.zeros((1, 30), jnp.float32), DT
     )
     np.testing.assert_array_equal(kept, F)
     np.testing.assert_array_equal(history, 0)
@@ -212,16 +213,16 @@ def test_sand_without_volume_correction_stays_looser():
     F = jnp.asarray(np.exp(0.04) * np.eye(3)[:, :, None])
     stresses = {}
     for law in (DRUCKER_PRAGER, UNCORRECTED_DRUCKER_PRAGER):
-        opened, _, history = law.update(values, F, jnp.zeros((len(law.history), 1)))
-        _, tau, _ = law.update(values, np.exp(-0.02) * opened, history)
+        opened, _, history = law.update(values, F, jnp.zeros((len(law.history), 1)), DT)
+        _, tau, _ = law.update(values, np.exp(-0.02) * opened, history, DT)
         stresses[law] = float(tau[0, 0, 0])
     assert stresses[DRUCKER_PRAGER] == 0
     bulk = (2 * MU + 3 * LAM) * -0.02
     assert stresses[UNCORRECTED_DRUCKER_PRAGER] == pytest.approx(bulk, rel=1e-12)
     # Where nothing has come apart the two are the same.
     pressed = jnp.asarray(samples() - 0.3 * np.eye(3)[:, :, None])
-    one = DRUCKER_PRAGER.update(values, pressed, jnp.zeros((1, 30)))
-    other = UNCORRECTED_DRUCKER_PRAGER.update(values, pressed, jnp.zeros((0, 30)))
+    one = DRUCKER_PRAGER.update(values, pressed, jnp.zeros((1, 30)), DT)
+    other = UNCORRECTED_DRUCKER_PRAGER.update(values, pressed, jnp.zeros((0, 30)), DT)
     np.testing.assert_allclose(one[0], other[0], atol=1e-14)
     np.testing.assert_allclose(one[1], other[1], atol=1e-14)
 
@@ -285,7 +286,7 @@ def test_gradients_against_central_differences(law, values):
     @jax.jit
     def loss(F, values, kept):
         return sum(
-            jnp.sum(w * x) for w, x in zip(weights, law.update(values, F, kept), strict=True)
+            jnp.sum(w * x) for w, x in zip(weights, law.update(values, F, kept, DT), strict=True)
         )
 
     gF, gv, gk = jax.jit(jax.grad(loss, (0, 1, 2)))(F, values, kept)
@@ -308,7 +309,7 @@ def test_gradients_at_rest_are_finite(law, values, dtype):
     values, kept = arrays(values, dtype), jnp.zeros((1, 1), dtype)
 
     def loss(F, values, kept):
-        return sum(jnp.sum(x) for x in law.update(values, F, kept))
+        return sum(jnp.sum(x) for x in law.update(values, F, kept, DT))
 
     gradient = jax.grad(loss, (0, 1, 2))(F, values, kept)
     assert all(np.isfinite(x).all() for x in jax.tree.leaves(gradient))
@@ -322,7 +323,7 @@ def test_one_sided_derivatives_at_the_yield_edge(side):
 
     def stress(t):
         F = jnp.diag(jnp.exp(jnp.stack([t, -t, 0 * t])))[:, :, None]
-        return VON_MISES.update(values, F, jnp.zeros((1, 1)))[1][0, 0, 0]
+        return VON_MISES.update(values, F, jnp.zeros((1, 1)), DT)[1][0, 0, 0]
 
     t, h = edge * (1 + side * 1e-6), 1e-9
     slope = float(jax.grad(stress)(t))

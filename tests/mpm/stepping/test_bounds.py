@@ -20,8 +20,10 @@ from jaxphys.mpm.stepping.bounds import (
     step_bounds,
     validate_dt,
 )
+from jaxphys.mpm.transfer import AFLIP, APIC, FLIP, PIC, Transfer
 
 LAWS = [NEO_HOOKEAN, FIXED_COROTATED, HENCKY]
+DT = 1e-3
 VALUES = {"youngs_modulus": jnp.asarray(1e5), "poisson_ratio": jnp.asarray(0.3)}
 MU, LAM = (float(x) for x in lame(VALUES))
 DENSITY, SPACING = jnp.full(4, 900.0), 0.05
@@ -110,7 +112,7 @@ def test_lone_modulus_is_the_largest_eigenvalue_of_the_stress_derivative(law):
             tau = []
             for side in (-1, 1):
                 moved = jnp.einsum("ij,jkp->ikp", np.eye(3) + side * h * e, F)
-                tau.append(np.asarray(law.update(VALUES, moved, jnp.zeros((0, 1)))[1][..., 0]))
+                tau.append(np.asarray(law.update(VALUES, moved, jnp.zeros((0, 1)), DT)[1][..., 0]))
             columns.append(((tau[1] - tau[0]) / (2 * h), e))
     matrix = [[np.sum(a * e) for _, e in columns] for a, _ in columns]
     expected = np.linalg.eigvals(np.array(matrix)).real.max()
@@ -145,6 +147,23 @@ def test_strain_and_its_rate_shorten_the_isolated_bound():
     assert isolated(HENCKY, still(), jnp.abs(spin)) < 0.9 * isolated(HENCKY, still())
 
 
+@pytest.mark.parametrize("scheme", [PIC(), FLIP(), APIC(), AFLIP()], ids=repr)
+def test_other_transfers_scale_the_bounds(scheme):
+    """With k for 4 all lengths are as those of a grid of 2 / sqrt(k) dx, and without an affine part
+    the rest is a share of the limit that is 1 / sqrt(2) of it.
+    """
+    random = np.random.default_rng(3)
+    F = still() + 0.1 * jnp.asarray(random.normal(size=(3, 3, 4)))
+    C = jnp.asarray(30 * random.normal(size=(3, 3, 4)))
+    share = 1 if scheme.affine else np.sqrt(0.5)
+    for kernel, k in (("quadratic", 4), ("cubic", 3)):
+        found = isolated_bound(
+            NEO_HOOKEAN, VALUES, F, C, DENSITY, SPACING, Transfer(scheme, kernel)
+        )
+        like = isolated_bound(NEO_HOOKEAN, VALUES, F, C, DENSITY, 2 / np.sqrt(k) * SPACING)
+        np.testing.assert_allclose(found, share * like, rtol=1e-6)
+
+
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Spring:
@@ -154,6 +173,9 @@ class Spring:
 
     def stiffest(self, model, grid):
         return jnp.max(model.volume / model.mass) * self.rate * grid.spacing
+
+    def fastest(self):
+        return jnp.zeros(())
 
 
 def test_contact_bounds_the_step_where_a_boundary_says_so():

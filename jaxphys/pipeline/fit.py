@@ -1,0 +1,191 @@
+"""A fit in a folder of its own: results, curves, and the fit beside what was observed."""
+
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from jaxphys.core.checkpoints import Checkpoints, fingerprint
+from jaxphys.core.files import aside_path
+from jaxphys.core.interrupt import deferred_interrupt
+from jaxphys.core.run_folder import run_folder
+from jaxphys.fitting.config import read_config
+from jaxphys.fitting.evaluation import Memory
+from jaxphys.fitting.fit import fit
+from jaxphys.fitting.observed import Images, Masks, Observed, Points, Tracks
+from jaxphys.fitting.result import ARRAYS, HISTORY, RESULT, Fit
+from jaxphys.gaussians.gaussians import from_points, to_splats
+from jaxphys.pipeline.draw import draw
+from jaxphys.pipeline.framing import frame_cameras
+from jaxphys.pipeline.video import VideoWriter
+from jaxphys.render.camera import Camera, position
+from jaxphys.render.renderer import render
+from jaxphys.scene.build import build, validate
+from jaxphys.scene.read import read_scene
+from jaxphys.scene.source import find, load_object
+from jaxphys.scene.view import View
+
+EVALUATIONS, CURVES, VIDEO = "evaluations/", "curves.png", "comparison.mp4"
+PRODUCTS = (RESULT, ARRAYS, HISTORY, CURVES, VIDEO, EVALUATIONS)
+SIDE = 360  # of a picture of dots [pixels]
+SEEN, FITTED = (0.85, 0.3, 0.1), (0.1, 0.35, 0.8)
+FPS = 8
+
+
+def fit_file(
+    path: str | os.PathLike,
+    out: str | os.PathLike,
+    *,
+    overwrite: bool = False,
+    progress: bool = False,
+    watch: Callable[[int], None] | None = None,
+) -> Fit:
+    """Fits what a config asks for; `out` gets `result.json`, `values.npz`, `history.jsonl`,
+    `curves.png` and `comparison.mp4`. An interrupted fit keeps its evaluations there, and the same
+    call goes on, to the same bytes.
+
+    Args:
+        path: of the config.
+        out: the folder: new, empty, or of an earlier run of the same request.
+        overwrite: whether another request's files in `out` may be replaced.
+        progress: whether to count evaluations on standard error.
+        watch: called with the number of evaluations after each; may raise KeyboardInterrupt.
+
+    Raises:
+        InputError: something cannot be used, named by file and field.
+        SimulationError: the simulation fails where the fit starts.
+        KeyboardInterrupt: what was evaluated is saved.
+    """
+    path = Path(path)
+    config = read_config(path)
+    scene = read_scene(path.parent / config.scene).scene
+    validate(scene)
+    beside = (path.parent / config.scene).parent
+    objects = [
+        load_object(thing, beside, scene.seed + i, f"objects[{i}]")
+        for i, thing in enumerate(scene.objects)
+    ]
+    simulation, look = build(scene, *objects)
+    observed = [one.read(path.parent) for one in config.observed]
+    sources = [find(thing.source, beside) for thing in scene.objects if thing.source is not None]
+    inputs = [path, path.parent / config.scene, *sources]
+    inputs += [one.path(path.parent) for one in config.observed]
+    files = tuple(source.read_bytes() for source in inputs)
+    identity = fingerprint(b"fit", *files)
+    end = (scene.frames - 1) * scene.seconds_per_frame
+    with run_folder(out, identity, PRODUCTS, inputs=inputs, overwrite=overwrite) as folder:
+        memory = Memory(Checkpoints(folder.file(EVALUATIONS), identity))
+        with (
+            deferred_interrupt() as interrupted,
+            tqdm(desc="fit", unit="evaluation", disable=not progress) as bar,
+        ):
+
+            def after():
+                bar.update()
+                if watch is not None:
+                    watch(bar.n)
+                if interrupted():
+                    raise KeyboardInterrupt
+
+            try:
+                found = fit(
+                    simulation,
+                    config.free,
+                    observed,
+                    look=look,
+                    end=end,
+                    search=config.search,
+                    stages=config.stages,
+                    starts=config.starts,
+                    seed=config.seed,
+                    level=config.level,
+                    memory=memory,
+                    watch=after,
+                )
+            except KeyboardInterrupt:
+                memory.save()
+                raise
+        found.write(folder)
+        draw_curves(folder.file(CURVES), found)
+        video = folder.file(VIDEO)
+        aside = aside_path(video)
+        try:
+            film_comparison(aside, found, observed[0])
+            os.replace(aside, video)
+        finally:
+            aside.unlink(missing_ok=True)
+        folder.remove(EVALUATIONS)
+    return found
+
+
+def draw_curves(path: Path, found: Fit) -> None:
+    """The loss, and each number where there are few, over the steps of the search."""
+    from matplotlib.figure import Figure
+
+    rows = [row for row in found.history if row["loss"] is not None]
+    names = list(rows[0].get("values", {})) if rows else []
+    figure = Figure(figsize=(6, 2.2 * (1 + len(names))), layout="constrained")
+    axes = figure.subplots(1 + len(names), 1, sharex=True, squeeze=False)[:, 0]
+    axes[0].semilogy([row["loss"] for row in rows])
+    axes[0].set_ylabel("loss")
+    for name, axis in zip(names, axes[1:], strict=True):
+        curve = np.array([np.ravel(row["values"][name]) for row in rows])
+        axis.plot(curve)
+        axis.set_ylabel(name)
+        if np.all(curve > 0) and curve.max() > 10 * curve.min():
+            axis.set_yscale("log")
+    axes[-1].set_xlabel("step")
+    figure.savefig(path, format="png", dpi=110)
+
+
+def film_comparison(path: Path, found: Fit, observed: Observed) -> None:
+    """What was observed, left, and the fit, right; dots over each other where no camera looked."""
+    pictures = list(_pictures(found, observed))
+    height, width = pictures[0].shape[:2]
+    with VideoWriter(path, width, height, FPS) as video:
+        for picture in pictures:
+            video.add(picture)
+
+
+def _pictures(found: Fit, observed: Observed) -> Iterator[np.ndarray]:
+    apart = np.abs(np.asarray(found.motion.time)[:, None] - np.asarray(observed.times))
+    frames = np.argmin(apart, axis=0)
+    if isinstance(observed, Images | Masks):
+        return _beside(found, observed, frames)
+    assert isinstance(observed, Tracks | Points)
+    clouds = observed.positions if isinstance(observed, Tracks) else observed.clouds
+    return _over(list(clouds), np.asarray(found.motion.position)[frames])
+
+
+def _beside(found: Fit, observed: Images | Masks, frames) -> Iterator[np.ndarray]:
+    """Pictures of the first camera, and the fit's."""
+    assert found.look is not None
+    camera, background = observed.views[0], observed.background
+    for seen, frame in zip(observed.pictures[0], frames, strict=True):
+        image = draw(found.look, found.motion[int(frame)], camera, background=background)
+        made = np.asarray(image.colour if isinstance(observed, Images) else image.alpha)
+        both = np.concatenate([np.asarray(seen), made], axis=1)
+        yield _bytes(both if both.ndim == 3 else np.repeat(both[..., None], 3, axis=-1))
+
+
+def _over(clouds: list, made: np.ndarray) -> Iterator[np.ndarray]:
+    """Dots: what was seen, the fit, and both."""
+    every = np.concatenate([made.reshape(-1, 3), *map(np.asarray, clouds)])
+    camera = frame_cameras(View(), [every], FPS, SIDE, SIDE)[0]
+    size = 0.004 * float(np.max(np.ptp(every, axis=0)))
+    for cloud, places in zip(clouds, made, strict=True):
+        seen, fitted = _dots(cloud, SEEN, size, camera), _dots(places, FITTED, size, camera)
+        yield _bytes(np.concatenate([seen, fitted, (seen + fitted) / 2], axis=1))
+
+
+def _dots(points, colour, size: float, camera: Camera) -> np.ndarray:
+    points = np.asarray(points, np.float32)
+    dots = from_points(points, np.broadcast_to(np.float32(colour), points.shape), size)
+    splats = to_splats(dots, position(camera))
+    return np.asarray(render(splats, camera, background=1.0).colour)
+
+
+def _bytes(picture: np.ndarray) -> np.ndarray:
+    return np.round(255 * np.clip(picture, 0, 1)).astype(np.uint8)
