@@ -6,6 +6,7 @@ grid, as a run has them. Work is counted in particle-steps.
 """
 
 import time
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -65,8 +66,10 @@ def start_devices(number: int | None = None) -> None:
     jax.config.update("jax_num_cpu_devices", number or cores())
 
 
-def model_and_state(case: dict, devices: int | None = None):
-    """(config, model, state) of a `block_case` in float32, on all devices or `devices` of them."""
+def model_and_state(case: dict, devices: int | None = None, *, slabs: bool = True):
+    """(config, model, state) of a `block_case` in float32, on all devices or `devices` of them;
+    slabs: each may have its own of the grid, where that suits.
+    """
     import jax.numpy as jnp
 
     from jaxphys.mpm.grid import Grid
@@ -92,16 +95,17 @@ def model_and_state(case: dict, devices: int | None = None):
         gravity=jnp.array(case["gravity"], jnp.float32),
     )
     state = initial_state(config, case["position"], case["velocity"], dtype=jnp.float32)
-    return windowed(config, state), model, state
+    config = windowed(config, state)
+    return config if slabs else replace(config, slabs=None), model, state
 
 
-def forward(case: dict, steps: int, devices: int | None = None):
+def forward(case: dict, steps: int, devices: int | None = None, *, slabs: bool = True):
     """A compiled `() -> State` that runs `steps` steps from the case's start."""
     import jax
 
     from jaxphys.mpm.loop.rollout import rollout
 
-    config, model, state = model_and_state(case, devices)
+    config, model, state = model_and_state(case, devices, slabs=slabs)
     run = jax.jit(partial(rollout, config, dt=case["dt"], steps=steps))
     return partial(run, model, state)
 

@@ -12,6 +12,7 @@ import json
 from pathlib import Path
 
 SUITE = "scaling"
+METHODS = {"jaxphys-window": "the window on each", "jaxphys": "slabs"}
 
 
 def read_lines(path: Path) -> dict[tuple[str, str], dict]:
@@ -39,11 +40,11 @@ def size_rows(lines: dict) -> list[tuple[int, float, float | None]]:
     return sorted(rows)
 
 
-def device_rows(lines: dict) -> list[tuple[int, int, float, float]]:
+def device_rows(lines: dict, method: str) -> list[tuple[int, int, float, float]]:
     """(devices, particles, ms a step, kB of traffic a device and step) of weak scaling."""
     rows = []
-    for (case, _), line in lines.items():
-        if case.startswith("weak-"):
+    for (case, by), line in lines.items():
+        if case.startswith("weak-") and by == method:
             time = 1e3 * line["seconds"] / line["steps"]
             rows.append((line["devices"], line["particles"], time, line["traffic_bytes"] / 1e3))
     return sorted(rows)
@@ -56,10 +57,17 @@ def tables(lines: dict) -> str:
         theirs = "| - | - |" if peer is None else f"| {peer:.0f} | {peer / ours:.2f} |"
         text.append(f"| {count:,} | {ours:.0f} {theirs}")
     text += ["", "| devices | particles | ms a step | kB a device and step |", "|---|---|---|---|"]
-    text += [f"| {d} | {n:,} | {t:.1f} | {kb:.0f} |" for d, n, t, kb in device_rows(lines)]
-    one, two = (lines.get(("strong", m)) for m in ("jaxphys-1-device", "jaxphys"))
-    if one and two:
-        text += ["", f"Strong scaling, 1 to 2 devices: {one['seconds'] / two['seconds']:.2f}"]
+    for method, name in METHODS.items():
+        text += [
+            f"| {d}, {name} | {n:,} | {t:.1f} | {kb:.0f} |"
+            for d, n, t, kb in device_rows(lines, method)
+        ]
+    one = lines.get(("strong", "jaxphys-1-device"))
+    for method, name in METHODS.items():
+        two = lines.get(("strong", method))
+        if one and two:
+            ratio = one["seconds"] / two["seconds"]
+            text += ["", f"Strong scaling, 1 to 2 devices, {name}: {ratio:.2f}"]
     return "\n".join(text)
 
 
@@ -78,8 +86,10 @@ def draw(lines: dict, path: Path) -> None:
     left.semilogx([r[0] for r in with_peer], [r[2] for r in with_peer], "s--", label="Taichi")
     left.set(xlabel="particles", ylabel="ns a particle and step", ylim=(0, None))
     left.legend()
-    weak = device_rows(lines)
-    right.plot([r[0] for r in weak], [r[3] for r in weak], "o-")
+    for (method, name), style in zip(METHODS.items(), ("s--", "o-"), strict=True):
+        weak = device_rows(lines, method)
+        right.plot([r[0] for r in weak], [r[3] for r in weak], style, label=name)
+    right.legend()
     right.set(xlabel="devices, 64,000 particles each", ylabel="kB a device and step")
     figure.savefig(path, metadata={"Date": None})
 

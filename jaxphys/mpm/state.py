@@ -10,7 +10,7 @@ from jax import Array
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.grid import Grid
-from jaxphys.mpm.loop.placement import Placement
+from jaxphys.mpm.loop.placement import Placement, Slabs
 from jaxphys.mpm.materials.law import Law
 from jaxphys.mpm.transfer.kernels import Kernel
 from jaxphys.mpm.transfer.schemes import Transfer
@@ -48,6 +48,8 @@ class Config:
         adapt.
     placement: in which chunks and on which devices particles are computed.
     transfer: how particles and grid exchange velocities, and with which kernel.
+    slabs: how devices share the window, or None where each has all of it. A slab follows the
+        particles of its device; if they outgrow it, the status says so.
     """
 
     grid: Grid
@@ -58,6 +60,7 @@ class Config:
     tells_rates: bool = False
     placement: Placement = Placement()
     transfer: Transfer = Transfer()
+    slabs: Slabs | None = None
 
     def __post_init__(self):
         reached = 0
@@ -83,6 +86,15 @@ class Config:
                 f"Config.window is {self.window}: it must lie between {width} nodes and the grid's "
                 f"{self.grid.shape} on each axis."
             )
+        if self.slabs is not None:
+            most = (self.window or self.grid.shape)[0]
+            if self.placement.devices == 1:
+                raise InputError("Config.slabs: one device has the whole window; set it to None.")
+            if not width <= self.slabs.planes <= most:
+                raise InputError(
+                    f"Config.slabs.planes is {self.slabs.planes}: it must lie between {width} and "
+                    f"the {most} nodes of the window along x."
+                )
 
     @property
     def particles(self) -> int:
@@ -96,8 +108,19 @@ class Config:
 
     @property
     def nodes(self) -> tuple[int, int, int]:
-        """Shape of the part of the grid that is computed."""
-        return self.window or self.grid.shape
+        """Shape of the part of the grid that a device computes."""
+        shape = self.window or self.grid.shape
+        return shape if self.slabs is None else (self.slabs.planes, *shape[1:])
+
+    @property
+    def parts(self) -> int:
+        """How many such parts there are: a slab for each device, or the window."""
+        return 1 if self.slabs is None else self.placement.devices
+
+    @property
+    def follows(self) -> bool:
+        """Whether what is computed of the grid follows the particles."""
+        return self.window is not None or self.slabs is not None
 
     @property
     def runs(self) -> tuple[tuple[Law, int, int], ...]:
@@ -111,7 +134,7 @@ class Config:
 
     @property
     def computed(self) -> Window:
-        """The part of the grid that is computed, for transfers."""
+        """The part of the grid that a device computes, for transfers."""
         return Window(self.nodes, self.grid.spacing, self.grid.shape, self.kernel)
 
     @property

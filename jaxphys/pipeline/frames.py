@@ -79,6 +79,18 @@ def _moment(simulation: Simulation, state: State, number: int, particles: Array 
     return Moment(number, state, frame, row)
 
 
+def wider(config: Config) -> list[Config]:
+    """Programs for a frame that outgrows what `config` computes of the grid, the next one first:
+    the window on every device instead of slabs, and then the whole grid.
+    """
+    found = []
+    if config.slabs is not None:
+        found.append(replace(config, slabs=None))
+    if config.window is not None:
+        found.append(replace(config, slabs=None, window=None))
+    return found
+
+
 def frames(
     simulation: Simulation,
     *,
@@ -126,8 +138,10 @@ def frames(
             program = windowed(config, before)
             for refinement in range(refinements + 1):
                 state = advance(program, before, refinement)
-                if int(state.status.code) == LEFT_WINDOW:
-                    program = replace(config, window=None)
+                for more in wider(program):
+                    if int(state.status.code) != LEFT_WINDOW:
+                        break
+                    program = more
                     state = advance(program, before, refinement)
                 if int(state.status.code) == OK:
                     break

@@ -18,6 +18,7 @@ import numpy as np
 from jaxphys.core.program import parts
 from jaxphys.gaussians.gaussians import Gaussians, from_points, transform
 from jaxphys.mpm.loop.chunks import cuts
+from jaxphys.mpm.loop.halo import sent_bytes
 from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.loop.window import windowed
 from jaxphys.mpm.materials.catalogue import MATERIALS
@@ -93,7 +94,9 @@ class Plan:
         left_out: part -> why.
         particles, gaussians, grid: sizes; window: of the grid, the part that the first frame
             computes.
-        devices: how many share the particles; chunk: particles computed together, at most.
+        devices: how many share the particles; chunk: particles computed together, at most; slab:
+            planes of the window that each has of its own, or None where each has all; sent: bytes
+            that a device sends to others in a step.
         pictures: frames drawn at once, each on a device of its own.
         stepping: how a frame is stepped through.
         substep: time step [s], of fixed steps; `bounds` [s] and `reason`: what limits it.
@@ -111,6 +114,8 @@ class Plan:
     window: tuple[int, int, int]
     devices: int
     chunk: int
+    slab: int | None
+    sent: int
     pictures: int
     stepping: str
     substep: float
@@ -216,6 +221,7 @@ def describe(scene: Scene, built: Built) -> Plan:
     included, left_out = _facts(scene, built)
     bounds = largest_stable_dt(simulation.config, simulation.model, simulation.state)
     reason = bounds.reason if scene.substep is None else "the scene's own substep"
+    first = windowed(simulation.config, simulation.state)
     placement, transfer = simulation.config.placement, simulation.config.transfer
     row, stencil = 4 * transfer.columns, transfer.spline.width**3
     chunk = max(into.size for into in cuts(simulation.config.runs, placement))
@@ -233,9 +239,11 @@ def describe(scene: Scene, built: Built) -> Plan:
         particles=particles,
         gaussians=drawn,
         grid=simulation.config.grid.shape,
-        window=windowed(simulation.config, simulation.state).nodes,
+        window=first.window or first.grid.shape,
         devices=placement.devices,
         chunk=chunk,
+        slab=None if first.slabs is None else first.slabs.planes,
+        sent=sent_bytes(first),
         pictures=drawn_at_once(scene.frames),
         stepping=_stepping_text(scene),
         substep=simulation.dt,
@@ -270,6 +278,16 @@ def _stepping_text(scene: Scene) -> str:
     return "fixed"
 
 
+def shared(plan: Plan) -> str:
+    """How devices share the window, for people."""
+    if plan.devices == 1:
+        return ""
+    sent = f"{plan.sent / 1000:,.0f} kB a device and step"
+    if plan.slab is None:
+        return f"; each has the window as a whole and adds its own to the others', {sent}"
+    return f"; each has {plan.slab} planes of the window and tells its neighbours, {sent}"
+
+
 def as_text(plan: Plan, as_json: bool = False) -> str:
     """The plan for people, or as JSON."""
     if as_json:
@@ -285,7 +303,7 @@ def as_text(plan: Plan, as_json: bool = False) -> str:
         at_once = f"{plan.pictures} frames drawn at once, one on each"
     lines += [
         f"particles: {plan.particles} ({plan.gaussians} carry Gaussians), grid {grid}{part}",
-        f"devices: {plan.devices}, particles in chunks of {plan.chunk}, {at_once}",
+        f"devices: {plan.devices}, particles in chunks of {plan.chunk}{shared(plan)}; {at_once}",
         f"stepping: {plan.stepping}",
         f"time step: {plan.substep:.3e} s, limited by {plan.reason}",
         *(f"  bound {name}: {value:.3e} s" for name, value in plan.bounds.items()),

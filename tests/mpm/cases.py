@@ -1,5 +1,6 @@
 """Small scenes shared by the solver's tests."""
 
+from dataclasses import replace
 from functools import partial
 
 import jax
@@ -7,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.loop.placement import Placement
 from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, initial_state
@@ -40,6 +42,21 @@ def block(count=60, shape=(9, 10, 11), dtype=jnp.float64, seed=0, law=NEO_HOOKEA
         dtype=dtype,
     )
     return config, model, state
+
+
+def long_block(count=200, cells=24, devices=1, **options):
+    """A block of `cells` cells along x, sorted by it, soft and without gravity: as `block`."""
+    config, model, state = block(
+        count,
+        (cells + 12, 10, 11),
+        placement=Placement(devices, 16),
+        check_step=False,
+        **options,
+    )
+    x = 0.6 + cells * 0.1 * np.sort(np.random.default_rng(5).random(count))
+    soft = {name: 0.1 * values for name, values in model.parameters.items()}
+    model = replace(model, gravity=None, parameters=soft)
+    return config, model, state._replace(position=state.position.at[0].set(x))
 
 
 def simulation_of(config, model, state, *, dt, steps, order=None, carriers=0):

@@ -24,25 +24,31 @@ from jaxphys.mpm.boundaries import (
 )
 from jaxphys.mpm.loop.adjoint import Plain
 from jaxphys.mpm.loop.chunks import cut, cuts, joined, numbers, orders
-from jaxphys.mpm.loop.placement import Placement, cache_bytes, suited
+from jaxphys.mpm.loop.placement import Placement, Slabs, cache_bytes, check_memory, suited
 from jaxphys.mpm.loop.rollout import rollout
 from jaxphys.mpm.materials.catalogue import MATERIALS, material_values
 from jaxphys.mpm.state import OK, STEP_TOO_LARGE, UNSTABLE_STEP, Config, Model, initial_state
+from jaxphys.mpm.transfer.schemes import AFLIP, APIC, Transfer
 
 from .cases import KINDS, block
 
 DEVICES = 4
 PLACEMENTS = [Placement(1, 16), Placement(2), Placement(2, 16), Placement(4, 16)]
 DT = 5e-4
+# Of `mixed`, by devices. Four share nodes with the ones after the next as well.
+SLABS = {2: Slabs(14, (8,)), 4: Slabs(10, (8, 6, 4))}
 pytestmark = pytest.mark.skipif(
     jax.device_count() < DEVICES, reason=f"needs {DEVICES} host devices: see tests/conftest.py"
 )
 
 
 def mixed(dtype, boundaries=(), names=KINDS, count=150):
-    """Materials side by side, in motion, strained into yielding: (config, model, state)."""
+    """Materials side by side, in motion, strained into yielding: (config, model, state). Some ten
+    cells along x.
+    """
     random = np.random.default_rng(3)
-    config, model, state = block(count=count, dtype=dtype)
+    config, model, state = block(count=count, shape=(16, 10, 11), dtype=dtype)
+    state = state._replace(position=state.position.at[0].multiply(3).at[0].add(-0.5))
     edges = np.linspace(0, count, len(names) + 1).astype(int)
     laws, parameters = [], {}
     for name, start, stop in zip(names, edges[:-1], edges[1:], strict=True):
@@ -108,15 +114,17 @@ def same(ours, theirs, small):
 def test_every_material_and_boundary(dtype):
     config, model, state = mixed(dtype, EVERY_BOUNDARY)
 
-    def end(placement):
-        run = partial(rollout, replace(config, placement=placement), dt=DT, steps=4)
+    def end(placement, slabs=None):
+        run = partial(rollout, replace(config, placement=placement, slabs=slabs), dt=DT, steps=4)
         return jax.jit(run)(model, state)._replace(residual=None)
 
     whole = end(Placement())
     assert int(whole.status.code) == OK and int(whole.status.taken) == 4
-    placements = [Placement(4, 16)] if dtype == jnp.float32 else [Placement(1, 16), Placement(2)]
-    for placement in placements:
-        same(end(placement), whole, 1e-6 if dtype == jnp.float32 else 1e-13)
+    ways = [(Placement(1, 16), None), (Placement(2), None), (Placement(2), SLABS[2])]
+    if dtype == jnp.float32:
+        ways = [(Placement(4, 16), None), (Placement(4, 16), SLABS[4])]
+    for way in ways:
+        same(end(*way), whole, 1e-6 if dtype == jnp.float32 else 1e-13)
 
 
 def gradients(config, model, state):
@@ -150,7 +158,36 @@ def test_gradients_of_materials_and_boundaries(dtype, names, boundaries):
     config, model, state = mixed(dtype, boundaries, names, count=70)
     whole = gradients(config, model, state)
     small = 1e-5 if dtype == jnp.float32 else 1e-12
-    same(gradients(replace(config, placement=Placement(2, 16)), model, state), whole, small)
+    for slabs in (None, SLABS[2]):
+        spread = replace(config, placement=Placement(2, 16), slabs=slabs)
+        same(gradients(spread, model, state), whole, small)
+
+
+@pytest.mark.parametrize("transfer", [Transfer(AFLIP(0.9)), Transfer(APIC(), "cubic")], ids=str)
+def test_transfers_on_slabs(transfer):
+    """Rows of eight numbers, and kernels that reach four nodes: bands carry both, forth and back."""
+    config, model, state = mixed(jnp.float64, EVERY_BOUNDARY[:1], ("jelly",), count=70)
+    config = replace(config, transfer=transfer)
+    whole = gradients(config, model, state)
+    spread = replace(config, placement=Placement(2, 16), slabs=Slabs(15, (9,)))
+    same(gradients(spread, model, state), whole, 1e-12)
+
+
+def test_tangents_on_slabs_are_those_of_the_way_back():
+    config, model, state = mixed(jnp.float64, EVERY_BOUNDARY[:1], ("jelly",), count=70)
+    config = replace(config, placement=Placement(2, 16), slabs=SLABS[2])
+    random = np.random.default_rng(5)
+    along = jnp.asarray(random.normal(size=state.velocity.shape))
+    weights = jnp.asarray(random.normal(size=state.position.shape))
+
+    def weighted(velocity):
+        end = rollout(config, model, state._replace(velocity=velocity), dt=DT, steps=3)
+        return jnp.sum(weights * end.position) + 1e-2 * jnp.sum(weights * end.velocity)
+
+    rate = jax.jit(lambda v: jax.jvp(weighted, (v,), (along,))[1])(state.velocity)
+    back = jnp.vdot(jax.jit(jax.grad(weighted))(state.velocity), along)
+    assert abs(float(rate)) > 1e-3
+    np.testing.assert_allclose(rate, back, rtol=1e-11)
 
 
 def test_the_same_bytes_from_run_to_run():
@@ -278,6 +315,27 @@ def test_wrong_placements_are_named():
         match=rf"devices is {many}, but JAX has {many - 1} cpu device.*jax_num_cpu_devices",
     ):
         rollout(config, model, state, dt=1e-3, steps=1)
+
+
+class Device:
+    """One that tells its memory as an accelerator does."""
+
+    def __init__(self, name, limit):
+        self.name, self.limit = name, limit
+
+    def __str__(self):
+        return self.name
+
+    def memory_stats(self):
+        return None if self.limit is None else {"bytes_limit": self.limit}
+
+
+def test_of_devices_of_unequal_memory_the_one_too_small_is_named():
+    devices = [Device("cuda:0", 80e9), Device("cuda:1", 2e9), Device("cpu:0", None)]
+    check_memory(devices, 4_000_000)
+    with pytest.raises(InputError, match=r"10000000 particles need 4 GB .* cuda:1 has 2: "):
+        check_memory(devices, 10_000_000)
+    check_memory(jax.devices(), 10**9)  # a processor's is told by the system
 
 
 def test_few_particles_stay_on_one_device_and_many_are_cut():

@@ -133,6 +133,15 @@ def test_the_command_says_the_same(tmp_path, capsys):
     assert "law Drucker-Prager" in text and "limited by" in text
 
 
+def test_how_devices_share_the_window_is_told():
+    plan = replace(make_plan(scene("jelly")), devices=4, chunk=4096, sent=409_600)
+    assert "of 4096; each has the window as a whole" in as_text(plan)
+    assert "and adds its own to the others', 410 kB a device and step" in as_text(plan)
+    slabs = as_text(replace(plan, slab=12))
+    assert "each has 12 planes of the window and tells its neighbours, 410 kB" in slabs
+    assert "each has" not in as_text(replace(plan, devices=1))
+
+
 def test_a_law_without_what_is_zero_is_told_as_such():
     plan = make_plan(scene("metal"))
     assert "law von Mises without hardening" in plan.included

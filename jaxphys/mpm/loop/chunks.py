@@ -99,13 +99,17 @@ def joined(parts: list[Any], cuts: tuple[Cut, ...], inverse: Array) -> Any:
 
 
 def orders(
-    position: Array, grid: Grid, segments: tuple, kernel: Kernel = QUADRATIC
+    position: Array,
+    grid: Grid,
+    segments: tuple,
+    kernel: Kernel = QUADRATIC,
+    settled: Array | None = None,
 ) -> tuple[Array, Array]:
     """(order, inverse), (N,) int32 each: which particle comes at each place, and at which place
-    each particle is. By grid cell within a segment, where they have mixed so far that sorting pays;
-    as they are otherwise.
+    each particle is. By grid cell within a segment, where they have mixed so far that sorting pays
+    or are not `settled`; as they are otherwise.
 
-    position: (3, N) [m].
+    position: (3, N) [m]; settled: () bool.
     """
     count = position.shape[1]
     base = jax.lax.stop_gradient(kernel.base_node(position, grid.spacing, grid.shape))
@@ -123,4 +127,7 @@ def orders(
         order = jnp.concatenate(runs)
         return order, jnp.zeros_like(order).at[order].set(as_they_are, unique_indices=True)
 
-    return jax.lax.cond(jnp.sum(back) > MIXED * count, by_cell, lambda: (as_they_are, as_they_are))
+    mixed = jnp.sum(back) > MIXED * count
+    if settled is not None:
+        mixed = mixed | ~settled
+    return jax.lax.cond(mixed, by_cell, lambda: (as_they_are, as_they_are))

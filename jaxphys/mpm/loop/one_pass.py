@@ -8,7 +8,8 @@ one starts with the flow that the state holds, and moves nothing.
 
 Its derivatives, in both directions, are passes of the same shape: `pass_derivative.py`.
 
-Several devices share the chunks. Each sums up the rows of its own particles and they add them up.
+Several devices share the chunks. Each sums up the rows of its own particles and they add them up:
+the whole window, or of a slab each what it shares with its neighbours (`halo`).
 """
 
 from functools import partial
@@ -20,6 +21,7 @@ from jax import Array
 from jax.flatten_util import ravel_pytree
 
 from jaxphys.mpm.boundaries import stages
+from jaxphys.mpm.loop import halo
 from jaxphys.mpm.loop.particle_step import (
     Flow,
     Matter,
@@ -30,9 +32,10 @@ from jaxphys.mpm.loop.particle_step import (
     update_grid,
     velocity_gradient,
 )
-from jaxphys.mpm.loop.placement import AXIS, spread
+from jaxphys.mpm.loop.placement import AXIS, EVERYWHERE, spread
 from jaxphys.mpm.loop.rates import slowest
-from jaxphys.mpm.loop.status import NO_FAILURE, failure, first_failure, least
+from jaxphys.mpm.loop.status import NO_FAILURE, failure, first_failure
+from jaxphys.mpm.loop.window import extent
 from jaxphys.mpm.state import Config, Residual
 from jaxphys.mpm.transfer import (
     gather,
@@ -45,7 +48,8 @@ class Inputs(NamedTuple):
     """What a pass may be differentiated by. Of particles one for each segment, in chunks.
 
     matter: its numbers; start: flow of the state, for the first pass, None in the last one; rows:
-    (M, 4), momentum and mass of the nodes, or (M, 8) where they also tell it before any force.
+    (M, 4), momentum and mass of the nodes, or (M, 8) where they also tell it before any force; of
+    slabs one after the other, a device's own on each.
     """
 
     shared: Shared
@@ -58,7 +62,8 @@ class Inputs(NamedTuple):
 class Fixed(NamedTuple):
     """What it may not. residuals, numbers of the particles, and flags, the loads that are no
     numbers, of each segment; origin, target: first nodes (3,) int32 of the windows that rows lie in
-    before and after; first: () bool; lightest: see `update_grid`.
+    before and after, of slabs (S, 3); bands: how these overlap after it; first: () bool; lightest:
+    see `update_grid`.
     """
 
     residuals: tuple[Residual | None, ...]
@@ -66,6 +71,7 @@ class Fixed(NamedTuple):
     flags: tuple[Matter, ...]
     origin: Array
     target: Array
+    bands: halo.Bands | None
     first: Array
     lightest: Array
 
@@ -75,7 +81,8 @@ class Seen(NamedTuple):
 
     failure: `first_failure`, (); below: the lowest `base_node` of any particle after it, and the
     highest one times -1, (6,), or None where the whole grid is computed; rates: `slowest` of them,
-    (2,), or None where nobody asks.
+    (2,), or None where nobody asks. Once the devices have told each other, below is of each slab,
+    (S, 6).
     """
 
     failure: Array
@@ -92,17 +99,9 @@ def nothing_seen(config: Config) -> Seen:
     most = jnp.array(NO_FAILURE, jnp.int32)
     return Seen(
         most,
-        None if config.window is None else jnp.full(6, most),
+        jnp.full(6, most) if config.follows else None,
         jnp.full(2, most) if config.tells_rates else None,
     )
-
-
-def extent(config: Config, position: Array) -> Array | None:
-    """`Seen.below` of particles (3, N)."""
-    if config.window is None:
-        return None
-    base = config.kernel.base_node(position, config.grid.spacing, config.grid.shape)
-    return least(jnp.concatenate([base, -base]))
 
 
 def numbers_and_flags(tree: Any) -> tuple[Any, Any]:
@@ -123,16 +122,24 @@ def whole(numbers: Any, flags: Any) -> Any:
 
 def at_nodes(config: Config, shared: Shared, rows: Array, fixed: Fixed) -> Array:
     """Velocities of the nodes, as particles see them, (M, 4) or (M, 8)."""
-    rows = update_grid(shared, fixed.lightest, rows)
-    return stages.on_grid(
-        shared.boundaries,
-        config.grid,
-        config.nodes,
-        fixed.origin,
-        rows,
-        shared.time,
-        shared.dt,
-    )
+
+    def updated(common, own):
+        shared, lightest = common
+        rows, origin = own
+        rows = update_grid(shared, lightest, rows)
+        return None, stages.on_grid(
+            shared.boundaries,
+            config.grid,
+            config.nodes,
+            origin.reshape(3),
+            rows,
+            shared.time,
+            shared.dt,
+        )
+
+    if config.slabs is not None:
+        updated = spread(config.placement, updated, lambda nothing: nothing)
+    return updated((shared, fixed.lightest), (rows, fixed.origin))[1]
 
 
 def run_pass(config: Config, last: bool, inputs: Inputs, fixed: Fixed):
@@ -142,9 +149,16 @@ def run_pass(config: Config, last: bool, inputs: Inputs, fixed: Fixed):
     config, last: static; gathered: the flow that particles had before they moved.
     """
     nodes = at_nodes(config, inputs.shared, inputs.rows, fixed)
-    run = spread(config.placement, partial(_forward_chunks, config, last), _join_over_devices)
+    place = halo.where(config)
+    run = spread(
+        config.placement,
+        partial(_forward_chunks, config, last),
+        partial(_join_over_devices, config),
+        (EVERYWHERE, place, place, place, place, EVERYWHERE),
+        (place, EVERYWHERE, EVERYWHERE),
+    )
     (rows, wrench, seen), (particles, residuals, flow, gathered) = run(
-        (inputs.shared, nodes, fixed.origin, fixed.target, fixed.first),
+        (inputs.shared, nodes, fixed.origin, fixed.target, fixed.bands, fixed.first),
         (
             inputs.start,
             inputs.particles,
@@ -157,18 +171,22 @@ def run_pass(config: Config, last: bool, inputs: Inputs, fixed: Fixed):
     return (particles, flow if last else rows, wrench), (residuals, seen), gathered
 
 
-def _join_over_devices(results):
+def _join_over_devices(config: Config, results):
     rows, wrench, seen = results
-    if rows is not None:
-        rows, wrench = jax.lax.psum((rows, wrench), AXIS)
     # All of them at once: what is small costs a meeting each.
     numbers, whole = ravel_pytree(seen)
-    return rows, wrench, whole(jax.lax.pmin(numbers, AXIS))
+    if config.slabs is None:
+        return rows, wrench, whole(jax.lax.pmin(numbers, AXIS))
+    of_each = jax.vmap(whole)(jax.lax.all_gather(numbers, AXIS))
+    of_all = jax.tree.map(lambda x: jnp.min(x, axis=0), of_each)
+    return rows, wrench, of_all._replace(below=of_each.below)
 
 
 def _forward_chunks(config: Config, last: bool, common, own):
     """All chunks of this device."""
-    shared, nodes, origin, target, first = common
+    shared, nodes, origin, target, bands, first = common
+    origin, target = origin.reshape(3), target.reshape(3)
+    highest = halo.highest(config, origin, bands)
     window = config.computed
     rows = None if last else jnp.zeros_like(nodes)
     wrench = None if last else stages.no_wrench(shared.boundaries, nodes.dtype)
@@ -184,6 +202,7 @@ def _forward_chunks(config: Config, last: bool, common, own):
         code = failure(
             config,
             origin,
+            highest,
             before,
             particles.position,
             flow.velocity,
@@ -243,6 +262,7 @@ def _forward_chunks(config: Config, last: bool, common, own):
             )
             result = (*state, None, flow)
         results.append(result)
+    rows, wrench = halo.total(config, target, bands, rows, wrench)
     return (rows, wrench, seen), tuple(zip(*results, strict=True))
 
 

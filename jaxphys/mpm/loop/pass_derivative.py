@@ -17,9 +17,10 @@ from jax import Array
 
 from jaxphys.core.linear_map import linear_map, zero_tangent
 from jaxphys.mpm.boundaries import stages
+from jaxphys.mpm.loop import halo
 from jaxphys.mpm.loop.one_pass import Fixed, Inputs, at_nodes, for_runs, run_pass, whole
 from jaxphys.mpm.loop.particle_step import Flow, give, move
-from jaxphys.mpm.loop.placement import AXIS, spread
+from jaxphys.mpm.loop.placement import AXIS, EVERYWHERE, spread
 from jaxphys.mpm.state import Config
 from jaxphys.mpm.transfer import (
     gather_slopes,
@@ -103,9 +104,25 @@ def _tangent(config: Config, last: bool, kept, tangents: tuple):
         (inputs.shared, inputs.rows),
         (shared, rows),
     )
-    run = spread(config.placement, partial(_tangent_chunks, config, last), _sum_over_devices)
+    place = halo.where(config)
+    run = spread(
+        config.placement,
+        partial(_tangent_chunks, config, last),
+        lambda sums: sums,
+        (EVERYWHERE, place, place, place, place, EVERYWHERE, EVERYWHERE, place),
+        (place, EVERYWHERE),
+    )
     (rows, wrench), (particles, flow, of_gathered) = run(
-        (inputs.shared, nodes, fixed.origin, fixed.target, fixed.first, shared, of_nodes),
+        (
+            inputs.shared,
+            nodes,
+            fixed.origin,
+            fixed.target,
+            fixed.bands,
+            fixed.first,
+            shared,
+            of_nodes,
+        ),
         (inputs.matter, fixed.flags, inputs.particles, gathered, matter, start, particles),
     )
     return particles, flow if last else rows, wrench, of_gathered
@@ -125,10 +142,26 @@ def _cotangent(config: Config, last: bool, kept, cotangents: tuple):
     nodes, through_grid = jax.vjp(
         lambda shared, rows: at_nodes(config, shared, rows, fixed), inputs.shared, inputs.rows
     )
-    run = spread(config.placement, partial(_cotangent_chunks, config, last), _sum_over_devices)
+    place = halo.where(config)
+    run = spread(
+        config.placement,
+        partial(_cotangent_chunks, config, last),
+        partial(_sum_over_devices, config),
+        (EVERYWHERE, place, place, EVERYWHERE, place, place, place, EVERYWHERE),
+        (EVERYWHERE, place),
+    )
     rows, flow = (None, rows_or_flow) if last else (rows_or_flow, None)
     (shared, nodes), (matter, start, particles) = run(
-        (inputs.shared, nodes, rows, wrench, fixed.origin, fixed.target, fixed.first),
+        (
+            inputs.shared,
+            nodes,
+            rows,
+            wrench,
+            fixed.origin,
+            fixed.target,
+            fixed.bands,
+            fixed.first,
+        ),
         (inputs.matter, fixed.flags, inputs.particles, gathered, particles, flow, to_gathered),
     )
     through_shared, rows = through_grid(nodes)
@@ -136,8 +169,12 @@ def _cotangent(config: Config, last: bool, kept, cotangents: tuple):
     return shared, matter, None if last else start, particles, rows
 
 
-def _sum_over_devices(results):
-    return results if results is None else jax.lax.psum(results, AXIS)
+def _sum_over_devices(config: Config, results):
+    """Of a slab each device knows all that its own particles ask of its copy of the nodes."""
+    if config.slabs is None:
+        return jax.lax.psum(results, AXIS)
+    shared, nodes = results
+    return jax.lax.psum(shared, AXIS), nodes
 
 
 def _between(config: Config, last: bool, law, flags, first: Array):
@@ -155,7 +192,8 @@ def _between(config: Config, last: bool, law, flags, first: Array):
 
 def _tangent_chunks(config: Config, last: bool, common, own):
     """All chunks of this device: tangents in, tangents out."""
-    shared, nodes, origin, target, first, of_shared, of_nodes = common
+    shared, nodes, origin, target, bands, first, of_shared, of_nodes = common
+    origin, target = origin.reshape(3), target.reshape(3)
     window = config.computed
     rows = None if last else jnp.zeros_like(nodes)
     wrench = None if last else stages.no_wrench(shared.boundaries, nodes.dtype)
@@ -186,12 +224,16 @@ def _tangent_chunks(config: Config, last: bool, common, own):
     for (law, _, _), *parts in zip(config.runs, *for_runs(own, config), strict=True):
         sums, result = jax.lax.scan(partial(of_chunk, law), sums, tuple(parts))
         results.append(result)
+    sums = halo.total(config, target, bands, *sums)
     return sums, tuple(zip(*results, strict=True))
 
 
 def _cotangent_chunks(config: Config, last: bool, common, own):
     """All chunks of this device, back: cotangents in, cotangents out."""
-    shared, nodes, rows, to_wrench, origin, target, first = common
+    shared, nodes, rows, to_wrench, origin, target, bands, first = common
+    origin, target = origin.reshape(3), target.reshape(3)
+    if rows is not None and bands is not None:
+        rows = halo.exchanged(config, target, bands, rows)
     window = config.computed
     total, results = (jax.tree.map(jnp.zeros_like, (shared, nodes))), []
 

@@ -13,7 +13,9 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxphys.core.errors import InputError
 
 AXIS = "particles"  # of the mesh
+EVERYWHERE, APART = PartitionSpec(), PartitionSpec(AXIS)  # as a whole; along the first axis
 PARTICLE_BYTES = 256  # of the state and of a pass's temporaries that a particle keeps in the cache
+STATE_BYTES = 400  # of a state in float32 and of the next one, a particle
 LEAST = {"cpu": 4_000}  # particles on each device, below which meeting costs more than it saves
 LEAST_ELSEWHERE = 50_000
 
@@ -48,7 +50,27 @@ class Placement:
 
     def everywhere(self) -> NamedSharding:
         """Where arrays lie that every device has as a whole, as a state between two frames."""
-        return NamedSharding(self.mesh(), PartitionSpec())
+        return NamedSharding(self.mesh(), EVERYWHERE)
+
+
+@dataclass(frozen=True)
+class Slabs:
+    """How the grid is spread, where each device has a slab of it across x. Part of the program.
+
+    planes: nodes along x of every slab.
+    bands: nodes along x that a device exchanges with the next one on either side, with the one
+        after that, and so on. Those further away share no node with it.
+    """
+
+    planes: int
+    bands: tuple[int, ...]
+
+    def __post_init__(self):
+        if not self.bands or min(self.bands) < 1 or self.planes < max(self.bands):
+            raise InputError(
+                f"Slabs.bands is {self.bands}: give at least one, each from 1 to the slab's "
+                f"{self.planes} planes."
+            )
 
 
 @cache
@@ -63,9 +85,18 @@ def _mesh(count: int) -> Mesh:
     return Mesh(np.array(found[:count]), (AXIS,))
 
 
-def spread(placement: Placement, function: Callable, reduce: Callable) -> Callable:
+def spread(
+    placement: Placement,
+    function: Callable,
+    reduce: Callable,
+    common=EVERYWHERE,
+    results=EVERYWHERE,
+) -> Callable:
     """`function(common, own) -> (common results, own results)` over the devices: each has its share
     of the chunks of `own`, along their first axis, and `reduce` makes one of their common results.
+
+    common, results: where parts of the common arguments and results are not `EVERYWHERE`, a
+    pytree's first levels that tell it.
     """
     if placement.devices == 1:
         return function
@@ -74,12 +105,11 @@ def spread(placement: Placement, function: Callable, reduce: Callable) -> Callab
         results, own = function(common, own)
         return reduce(results), own
 
-    everywhere, apart = PartitionSpec(), PartitionSpec(AXIS)
     return jax.shard_map(
         on_each,
         mesh=placement.mesh(),
-        in_specs=(everywhere, apart),
-        out_specs=(everywhere, apart),
+        in_specs=(common, APART),
+        out_specs=(results, APART),
         check_vma=False,
     )
 
@@ -94,8 +124,8 @@ def gathered(placement: Placement, own: Any) -> Any:
     return jax.shard_map(
         lambda tree: jax.tree.map(lambda x: jax.lax.all_gather(x, AXIS, tiled=True), tree),
         mesh=placement.mesh(),
-        in_specs=PartitionSpec(AXIS),
-        out_specs=PartitionSpec(),
+        in_specs=APART,
+        out_specs=EVERYWHERE,
         check_vma=False,
     )(own)
 
@@ -110,16 +140,35 @@ def suited(particles: int, devices: int | None = None) -> Placement:
     Args:
         particles: how many.
         devices: at most so many; None: as many as there are.
+
+    Raises:
+        InputError: one of them has no room for the state, which each of them has as a whole.
     """
     platform = jax.default_backend()
     least = LEAST.get(platform, LEAST_ELSEWHERE)
     there = jax.device_count() if devices is None else devices
     used = max(1, min(there, particles // least))
+    check_memory(jax.devices()[:used], particles)
     if platform != "cpu":
         return Placement(used)
     second, last = cache_bytes()
     fits = used == 1 and particles * PARTICLE_BYTES <= last
     return Placement(used, None if fits else max(1024, second // PARTICLE_BYTES))
+
+
+def check_memory(devices: list, particles: int) -> None:
+    """Raises `InputError` that names the first device that cannot hold `particles`: the smallest
+    decides, since all have equal shares and the whole state. What does not tell its memory passes.
+    """
+    needed = particles * STATE_BYTES
+    for device in devices:
+        limit = (device.memory_stats() or {}).get("bytes_limit")
+        if limit is not None and limit < needed:
+            raise InputError(
+                f"{particles} particles need {needed / 1e9:.3g} GB on every device, but {device} "
+                f"has {limit / 1e9:.3g}: take fewer particles, or leave the device out "
+                "(CUDA_VISIBLE_DEVICES)."
+            )
 
 
 @cache

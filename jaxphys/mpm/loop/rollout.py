@@ -8,17 +8,16 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 
 from jaxphys.core import compensated
 from jaxphys.core.errors import InputError
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
-from jaxphys.mpm.loop import rigid_body
+from jaxphys.mpm.loop import halo, rigid_body
 from jaxphys.mpm.loop.adjoint import Adjoint, Plain, repeat
-from jaxphys.mpm.loop.chunks import Cut, cut, cuts, joined, numbers, orders
-from jaxphys.mpm.loop.one_pass import Fixed, Inputs, extent, numbers_and_flags
+from jaxphys.mpm.loop.chunks import Cut, cut, cuts, joined, numbers
+from jaxphys.mpm.loop.one_pass import Fixed, Inputs, numbers_and_flags
 from jaxphys.mpm.loop.particle_step import Flow, Matter, Particles, Shared, velocity_gradient
 from jaxphys.mpm.loop.pass_derivative import one_pass
 from jaxphys.mpm.loop.placement import gathered
@@ -26,6 +25,7 @@ from jaxphys.mpm.loop.rates import slowest
 from jaxphys.mpm.loop.replay import check_sequence, replayed
 from jaxphys.mpm.loop.status import MOST_PARTICLES, after_step
 from jaxphys.mpm.loop.step_check import checked, stiffening
+from jaxphys.mpm.loop.window import extent, followed, hulls, orders_for
 from jaxphys.mpm.state import OK, Config, Model, Residual, RigidBody, State, Status
 from jaxphys.mpm.stepping.bounds import contact_bound, with_wave_modulus
 
@@ -35,8 +35,8 @@ PLAIN = Plain()
 class Chunks(NamedTuple):
     """A state in chunks, on its way from pass to pass. Of particles one for each segment.
 
-    rows, origin: momentum and mass of the nodes for the next step, and their window; below, rates:
-    as in `Seen`; first: () bool, whether no pass was yet; rigid: as in `State`.
+    rows, origin: momentum and mass of the nodes for the next step, and their window or slabs;
+    below, rates: as in `Seen`; first: () bool, whether no pass was yet; rigid: as in `State`.
     """
 
     particles: tuple[Particles, ...]
@@ -158,7 +158,7 @@ class Passes(NamedTuple):
             body = rigid_body.moved(obstacle, chunks.rigid, moves)
             boundaries = rigid_body.placed(boundaries, obstacle, body)
         shared = Shared(self.model.gravity, boundaries, dt, ahead, chunks.time, later)
-        target = window_origin(self.config, chunks.below)
+        target = followed(self.config, chunks.below, chunks.origin)
         start = None if last else self.flows
         (particles, rows, wrench), (residuals, seen) = one_pass(
             self.config,
@@ -170,6 +170,7 @@ class Passes(NamedTuple):
                 self.flags,
                 chunks.origin,
                 target,
+                halo.bands(self.config, chunks.below),
                 chunks.first,
                 jax.lax.stop_gradient(self.lightest),
             ),
@@ -210,7 +211,7 @@ def prepared(config: Config, model: Model, state: State) -> Passes:
     check_fit(config, model, state)
     model = with_wave_modulus(config, model)
     segments = cuts(config.runs, config.placement)
-    order, inverse = orders(state.position, config.grid, config.runs, config.kernel)
+    order, inverse = orders_for(config, state.position)
     matter, flags = numbers_and_flags(matter_of(config, model, segments, order))
     return Passes(
         config,
@@ -282,12 +283,18 @@ def cut_state(config: Config, state: State, segments, order) -> Chunks:
                 own = own._replace(history=cut(state.history[: len(law.history)], into, order))
         particles.append(own)
         residuals.append(cut(rest, into, order))
+    if config.slabs is None:
+        below = extent(config, jax.lax.stop_gradient(state.position))
+    else:
+        below = hulls(config, [jax.lax.stop_gradient(own.position) for own in particles])
     return Chunks(
         tuple(particles),
         tuple(residuals),
-        jnp.zeros((config.computed.nodes, config.transfer.columns), state.position.dtype),
-        jnp.zeros(3, jnp.int32),
-        extent(config, jax.lax.stop_gradient(state.position)),
+        jnp.zeros(
+            (config.parts * config.computed.nodes, config.transfer.columns), state.position.dtype
+        ),
+        jnp.zeros(3 if config.slabs is None else (config.parts, 3), jnp.int32),
+        below,
         slowest(config, *jax.lax.stop_gradient((state.velocity, state.affine))),
         state.time,
         None if state.residual is None else state.residual.time,
@@ -295,19 +302,6 @@ def cut_state(config: Config, state: State, segments, order) -> Chunks:
         jnp.array(True),
         state.rigid,
     )
-
-
-def window_origin(config: Config, below: Array | None) -> Array:
-    """First node (3,) of the window for particles of an extent `Seen.below`: as much room on either
-    side.
-    """
-    if below is None:
-        return jnp.zeros(3, jnp.int32)
-    lowest, highest = below[:3], -below[3:]
-    shape = np.array(config.nodes, np.int32)
-    room = np.array(config.grid.shape, np.int32) - shape
-    free = shape - config.kernel.width - (highest - lowest)
-    return jnp.clip(lowest - jnp.maximum(free, 0) // 2, 0, room)
 
 
 def join_state(config: Config, before: State, chunks: Chunks, segments, inverse) -> State:

@@ -48,7 +48,7 @@ _CAUSES = {
     ),
     LEFT_WINDOW: (
         "outgrew the window of the grid",
-        "enlarge Config.window, or set it to None",
+        "enlarge Config.window (and Config.slabs), or set them to None",
     ),
     INVERTED: (
         "is turned inside out (det F <= 0)",
@@ -96,7 +96,8 @@ def check(status: Status, frame: int | None = None) -> None:
 
 def failure(
     config: Config,
-    origin: Array,
+    lowest: Array,
+    highest: Array,
     before: Array,
     position: Array,
     velocity: Array,
@@ -110,7 +111,8 @@ def failure(
     inside out: that is a step too large. What is inverted without one was given so, and no law
     brings it back: Hencky's take a mirror image for rest.
 
-    origin: of the window (3,); before: positions (3, N) from which the step started.
+    lowest, highest: `base_node` (3,) that the window has room for; before: positions (3, N) from
+    which the step started.
     """
     grid, kernel = config.grid, config.kernel
     # Sums written out: a reduction within a fusion is not vectorised.
@@ -120,11 +122,11 @@ def failure(
     slow &= algebra.total(x * x for x in c) * dt**2 <= 1
     volume = algebra.determinant(F)
     code = jnp.full(finite.shape, OK, jnp.int32)
-    if config.nodes != grid.shape:
+    if config.follows:
         # A particle outside of the window was clamped in the transfers of this very step.
-        room = jnp.array(config.nodes, jnp.int32)[:, None] - kernel.width
-        local = kernel.base_node(before, grid.spacing, grid.shape) - origin[:, None]
-        code = jnp.where(jnp.all((local >= 0) & (local <= room), axis=0), code, LEFT_WINDOW)
+        base = kernel.base_node(before, grid.spacing, grid.shape)
+        held = (base >= lowest[:, None]) & (base <= highest[:, None])
+        code = jnp.where(jnp.all(held, axis=0), code, LEFT_WINDOW)
     code = jnp.where(kernel.inside(position, grid.spacing, grid.shape), code, LEFT_GRID)
     code = jnp.where(volume < COLLAPSE, COLLAPSED, code)
     code = jnp.where(volume <= 0, INVERTED, code)

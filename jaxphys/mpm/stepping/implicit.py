@@ -23,7 +23,6 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.program import part
 from jaxphys.mpm.loop.adjoint import Adjoint, Plain, repeat
 from jaxphys.mpm.loop.chunks import cuts, numbers, orders
-from jaxphys.mpm.loop.one_pass import extent
 from jaxphys.mpm.loop.particle_step import Flow, Matter, Particles, Shared
 from jaxphys.mpm.loop.rollout import (
     check_fit,
@@ -32,9 +31,9 @@ from jaxphys.mpm.loop.rollout import (
     join_state,
     keep_good,
     matter_of,
-    window_origin,
 )
 from jaxphys.mpm.loop.status import NO_FAILURE
+from jaxphys.mpm.loop.window import extent, followed
 from jaxphys.mpm.state import (
     CODES,
     LEFT_GRID,
@@ -140,6 +139,11 @@ def _refuse(config: Config, model: Model) -> None:
             "Implicit: steps are solved with APIC and quadratic splines; leave Config.transfer as "
             "it is, or take explicit steps"
         )
+    if config.slabs is not None:
+        raise InputError(
+            "Implicit: every device has the window as a whole in implicit steps; set Config.slabs "
+            "to None"
+        )
     for law, _, _ in config.runs:
         if law.energy is None or law.viscosity is not None:
             raise InputError(
@@ -180,7 +184,7 @@ def attempt(
     """One step of `dt` [s] from `time` [s], whatever comes of it. Differentiable."""
     theta = stepping.theta
     stage = theta * dt
-    origin = window_origin(config, _extent(config, moving.particles))
+    origin = followed(config, _extent(config, moving.particles), jnp.zeros(3, jnp.int32))
     shared = Shared(gravity, boundaries, dt, dt, time, time + dt)
     start = Start(shared, origin, stage)
     with part("implicit step"):

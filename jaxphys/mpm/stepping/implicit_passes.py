@@ -23,6 +23,7 @@ from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
 from jaxphys.mpm.boundaries.potential import Lag, has_potential, lags, pushed, slipped
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.loop import halo
 from jaxphys.mpm.loop.particle_step import (
     Flow,
     Matter,
@@ -375,6 +376,7 @@ def finish(
         code = failure(
             config,
             start.origin,
+            halo.highest(config, start.origin, None),
             place,
             after.position,
             flow.velocity,
