@@ -25,12 +25,13 @@ from benchmarks.case import Case, Prepared
 from jaxphys.mpm.boundaries import Plane, Setting, prepare
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.frames import advance_frame
+from jaxphys.mpm.loop.implicit.rollout import implicit_rollout
 from jaxphys.mpm.loop.status import check
 from jaxphys.mpm.materials.elasticity import FIXED_COROTATED
 from jaxphys.mpm.state import Config, Model, State, initial_state
 from jaxphys.mpm.stepping.bounds import largest_stable_dt
 from jaxphys.mpm.stepping.fixed import SAFETY
-from jaxphys.mpm.stepping.implicit import Implicit, implicit_rollout
+from jaxphys.mpm.stepping.implicit import Implicit
 
 DX, DENSITY = 0.1, 1000.0
 FIXED, LINEARISED = 3, 3  # passes of an implicit step, and of a Newton iteration, besides the rest

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .mpm.simulation import Simulation as Simulation
     from .mpm.stepping import Adaptive as Adaptive
     from .mpm.stepping import Fixed as Fixed
+    from .mpm.stepping import Implicit as Implicit
     from .pipeline.animate import animate as animate
     from .pipeline.draw import draw as draw
     from .pipeline.frames import frames as frames
@@ -64,6 +65,7 @@ _HOMES = {
     "Simulation": "mpm.simulation",
     "Adaptive": "mpm.stepping",
     "Fixed": "mpm.stepping",
+    "Implicit": "mpm.stepping",
     "animate": "pipeline.animate",
     "draw": "pipeline.draw",
     "frames": "pipeline.frames",

@@ -24,7 +24,7 @@ def generate(
     frames: int | None = None,
     steps: int | None = None,
     splats: int | None = None,
-    stepping: Literal["adaptive", "fixed"] | None = None,
+    stepping: Literal["adaptive", "fixed", "implicit"] | None = None,
     prior: str | None = None,
     shape_prior: str | None = None,
     negative: str | None = None,
@@ -47,7 +47,8 @@ def generate(
         frames: Number of pictures. Default: 48.
         steps: Steps of optimisation.
         splats: Number of Gaussians at most.
-        stepping: Time steps that adapt to what the motion allows, or equal ones. Default: adaptive.
+        stepping: Time steps that adapt to what the motion allows, equal ones, or implicit ones for
+            stiff matter in slow motion (`jaxphys plan` says what pays). Default: adaptive.
         prior: Judges pictures: bundled, stable-diffusion, stable-diffusion-2.1-base,
             stable-diffusion-2.1, or a folder in diffusers' layout. Or library: no prior, but the
             parametric model that the words mean; `jaxphys priors` lists them. Default: bundled.
@@ -153,7 +154,7 @@ def animate(
     height: int | None = None,
     frames: int | None = None,
     splats: int | None = None,
-    stepping: Literal["adaptive", "fixed"] | None = None,
+    stepping: Literal["adaptive", "fixed", "implicit"] | None = None,
     substep: float | None = None,
     unsafe_dt: bool = False,
     save_splats: bool = False,
@@ -172,7 +173,8 @@ def animate(
         height: Of the video [pixels]. Default: 1090.
         frames: Number of pictures. Default: 48.
         splats: Number of Gaussians that a mesh becomes. Default: 20000.
-        stepping: Time steps that adapt to what the motion allows, or equal ones. Default: adaptive.
+        stepping: Time steps that adapt to what the motion allows, equal ones, or implicit ones for
+            stiff matter in slow motion (`jaxphys plan` says what pays). Default: adaptive.
         substep: Time step [s], which makes steps equal. Default: as large as is safe.
         unsafe_dt: Take --substep even if it is beyond what is stable.
         save_splats: Also write one .ply for each picture.

@@ -8,7 +8,7 @@ from typing import Any
 from jaxphys.core.errors import InputError, one_line
 from jaxphys.core.reading import reading
 from jaxphys.mpm.materials.catalogue import get_material
-from jaxphys.mpm.stepping import Adaptive, Fixed
+from jaxphys.mpm.stepping import Adaptive, Fixed, Implicit
 from jaxphys.scene.build import validate
 from jaxphys.scene.defaults import default_scene
 from jaxphys.scene.model_folder import is_trained, splats_in
@@ -61,7 +61,7 @@ def stepping_for(name: str | None, substep: float | None = None) -> dict[str, An
     """The change of a scene for `--stepping`; a `--substep` is a fixed step."""
     if name is None:
         return {} if substep is None else {"stepping": Fixed()}
-    return {"stepping": {"adaptive": Adaptive, "fixed": Fixed}[name]()}
+    return {"stepping": {"adaptive": Adaptive, "fixed": Fixed, "implicit": Implicit}[name]()}
 
 
 def files_read(config: Path | None, source: Path | None = None) -> tuple[Path, ...]:

@@ -26,7 +26,7 @@ from jaxphys.mpm.materials.parameters import DENSITY
 from jaxphys.mpm.motion import BodyFrame, Frame
 from jaxphys.mpm.state import OK, Config, Model, State
 from jaxphys.mpm.stepping import Fixed, Stepping
-from jaxphys.mpm.stepping.fixed import choose_substep
+from jaxphys.mpm.stepping.frame_steps import frame_steps
 
 FIXED = Fixed()
 # What `Simulation.with_` takes beside the parameters of the materials.
@@ -60,10 +60,10 @@ class Simulation:
         carriers: which particle, in the object's order, carries each drawn point, int32 (K,).
         config: the solver's program.
         counts: particles of each object; objects follow one another in the object's order.
-        dt: time step [s], of fixed steps.
+        dt: time step [s], of fixed steps; of implicit ones the time of a frame.
         steps: fixed time steps a frame.
         given_substep: the largest step that was asked for [s], or None: as the bounds allow.
-        stepping: how a frame is stepped through: `Fixed()` or `Adaptive()`.
+        stepping: how a frame is stepped through: `Fixed()`, `Adaptive()` or `Implicit()`.
     """
 
     model: Model
@@ -182,7 +182,8 @@ class Simulation:
         """With the time step that the numbers allow, where all of them are known."""
         if any(is_traced(leaf) for leaf in jax.tree.leaves((self.model, self.state))):
             return self
-        dt, steps, _ = choose_substep(
+        dt, steps = frame_steps(
+            self.stepping,
             self.config,
             self.model,
             self.state,

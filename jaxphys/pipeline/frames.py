@@ -7,6 +7,7 @@ Film, checkpoint, metrics and whoever comes after consume the same iterator.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 
 import jax
@@ -14,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jaxphys.mpm.loop.frames import next_frame
+from jaxphys.mpm.loop.frames import next_frame, shares_the_grid
 from jaxphys.mpm.loop.status import check
 from jaxphys.mpm.loop.window import windowed
 from jaxphys.mpm.materials.fracture import number_of_pieces
@@ -121,6 +122,7 @@ def frames(
         yield _moment(simulation, simulation.state, 0, particles)
     number, state = start
     config, model = simulation.config, simulation.model
+    cut = partial(windowed, slabs=shares_the_grid(simulation.stepping))
     if config.placement.devices > 1:
         # Where the frames leave it, so that the first one is no program of its own.
         model, state = jax.device_put((model, state), config.placement.everywhere())
@@ -129,13 +131,13 @@ def frames(
         return next_frame(simulation, config, model, state, refinement)
 
     with timing.stage("simulate"), timing.compiling("simulate"):
-        jax.block_until_ready(advance(windowed(config, state), state, None))
+        jax.block_until_ready(advance(cut(config, state), state, None))
     refinements = 0 if simulation.given_substep is not None else REFINEMENTS
     while True:
         number += 1
         with timing.stage("simulate"):
             before = state
-            program = windowed(config, before)
+            program = cut(config, before)
             for refinement in range(refinements + 1):
                 state = advance(program, before, refinement)
                 for more in wider(program):

@@ -5,8 +5,9 @@ picture of the very simulation that would run, and finds the marks.
 """
 
 import json
+import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -15,15 +16,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxphys.core.errors import InputError
 from jaxphys.core.program import parts
 from jaxphys.gaussians.gaussians import Gaussians, from_points, transform
 from jaxphys.mpm.loop.chunks import cuts
+from jaxphys.mpm.loop.frames import shares_the_grid
 from jaxphys.mpm.loop.halo import sent_bytes
+from jaxphys.mpm.loop.implicit.step import check_implicit, implicit_step
 from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.loop.window import windowed
 from jaxphys.mpm.materials.catalogue import MATERIALS
-from jaxphys.mpm.stepping import Adaptive
+from jaxphys.mpm.simulation import Simulation
+from jaxphys.mpm.stepping import Adaptive, Implicit
 from jaxphys.mpm.stepping.bounds import largest_stable_dt
+from jaxphys.mpm.stepping.choice import which_stepping
 from jaxphys.pipeline.film import drawn_at_once, picture, surroundings_of
 from jaxphys.render.camera import orbit
 from jaxphys.scene.build import Built, build
@@ -52,6 +58,7 @@ OPTIONAL: Mapping[str, tuple[str, str]] = MappingProxyType(
         "return map": ("a law is plastic", "no law is plastic"),
         "viscosity": ("a fluid has it", "no fluid has any"),
         "history": ("a law remembers", "no law remembers"),
+        "implicit step": ("the scene asks for it", "steps are explicit"),
         "second deformation gradient": (
             "plastic flow must be seen in the splats",
             "splats follow the gradient that the laws see",
@@ -98,7 +105,7 @@ class Plan:
             planes of the window that each has of its own, or None where each has all; sent: bytes
             that a device sends to others in a step.
         pictures: frames drawn at once, each on a device of its own.
-        stepping: how a frame is stepped through.
+        stepping: how a frame is stepped through; advice: which way is cheaper, and why.
         substep: time step [s], of fixed steps; `bounds` [s] and `reason`: what limits it.
         steps_per_frame, frames, steps: counts, of fixed steps; those that adapt are not known
             before they are taken.
@@ -118,6 +125,7 @@ class Plan:
     sent: int
     pictures: int
     stepping: str
+    advice: str
     substep: float
     bounds: dict[str, float]
     reason: str
@@ -156,7 +164,10 @@ def program_parts(scene: Scene, built: Built) -> dict[str, int]:
     """Marked parts of the step and of the picture, with the number of primitives of each."""
     simulation, look = built
     state = simulation.state
-    found = parts(partial(step, simulation.config), simulation.model, state, simulation.dt)
+    advance = partial(step, simulation.config)
+    if isinstance(simulation.stepping, Implicit):
+        advance = partial(implicit_step, simulation.config, stepping=simulation.stepping)
+    found = parts(advance, simulation.model, state, simulation.dt)
     dtype = state.position.dtype
     camera = orbit((0.0, 0.0, 0.0), 1.0, 0.0, 0.0, width=scene.width, height=scene.height)
     paint = partial(picture, surroundings=surroundings_of(scene), capacity=1024)
@@ -221,13 +232,16 @@ def describe(scene: Scene, built: Built) -> Plan:
     included, left_out = _facts(scene, built)
     bounds = largest_stable_dt(simulation.config, simulation.model, simulation.state)
     reason = bounds.reason if scene.substep is None else "the scene's own substep"
-    first = windowed(simulation.config, simulation.state)
+    slabs = shares_the_grid(simulation.stepping)
+    first = windowed(simulation.config, simulation.state, slabs=slabs)
     placement, transfer = simulation.config.placement, simulation.config.transfer
     row, stencil = 4 * transfer.columns, transfer.spline.width**3
     chunk = max(into.size for into in cuts(simulation.config.runs, placement))
     particles, drawn = simulation.config.particles, look.gaussians.count
     nodes = int(np.prod(simulation.config.grid.shape))
-    steps = simulation.steps * (scene.frames - 1)
+    advice, substep, a_frame, passes = _steps(simulation)
+    steps = a_frame * (scene.frames - 1)
+    passes *= scene.frames - 1
     # What the scene has nothing of sets no bound.
     limits = {k: float(v) for k, v in bounds._asdict().items() if np.isfinite(v)}
     pixels = scene.width * scene.height
@@ -246,10 +260,11 @@ def describe(scene: Scene, built: Built) -> Plan:
         sent=sent_bytes(first),
         pictures=drawn_at_once(scene.frames),
         stepping=_stepping_text(scene),
-        substep=simulation.dt,
+        advice=advice,
+        substep=substep,
         bounds=limits,
         reason=reason,
-        steps_per_frame=simulation.steps,
+        steps_per_frame=a_frame,
         frames=scene.frames,
         steps=steps,
         memory={
@@ -261,7 +276,8 @@ def describe(scene: Scene, built: Built) -> Plan:
         },
         seconds={
             "compile": COMPILE_SECONDS,
-            "simulate": steps * (particles / PARTICLE_STEPS_A_SECOND + nodes / NODE_STEPS_A_SECOND),
+            "simulate": passes
+            * (particles / PARTICLE_STEPS_A_SECOND + nodes / NODE_STEPS_A_SECOND),
             "render": scene.frames * (pixels / PIXELS_A_SECOND + drawn / SPLATS_A_SECOND),
         },
     )
@@ -275,7 +291,30 @@ def _stepping_text(scene: Scene) -> str:
             f"adaptive, the bounds looked at again every {stepping.every} steps; "
             "equal ones would be"
         )
+    if isinstance(stepping, Implicit):
+        method = {1.0: "backward Euler", 0.5: "midpoint"}.get(
+            stepping.theta, f"theta {stepping.theta}"
+        )
+        return f"implicit ({method}), as long as speed and deformation allow, solved for"
     return "fixed"
+
+
+def _steps(simulation: Simulation) -> tuple[str, float, int, float]:
+    """Which way is cheaper and why; the step [s], steps and passes over all particles a frame.
+
+    Of implicit steps an estimate, from the speeds of the start.
+    """
+    config, model, state = simulation.config, simulation.model, simulation.state
+    steps = simulation.steps
+    try:
+        check_implicit(replace(config, slabs=None), model)
+    except InputError as error:
+        return f"explicit alone is possible ({error})", simulation.dt, steps, steps
+    choice = which_stepping(config, model, state, simulation.frame_time)
+    if not isinstance(simulation.stepping, Implicit):
+        return choice.reason, simulation.dt, steps, steps
+    count = max(1, math.ceil(simulation.frame_time / choice.length - 1e-9))
+    return choice.reason, simulation.frame_time / count, count, choice.implicit
 
 
 def shared(plan: Plan) -> str:
@@ -305,6 +344,7 @@ def as_text(plan: Plan, as_json: bool = False) -> str:
         f"particles: {plan.particles} ({plan.gaussians} carry Gaussians), grid {grid}{part}",
         f"devices: {plan.devices}, particles in chunks of {plan.chunk}{shared(plan)}; {at_once}",
         f"stepping: {plan.stepping}",
+        f"  {plan.advice}",
         f"time step: {plan.substep:.3e} s, limited by {plan.reason}",
         *(f"  bound {name}: {value:.3e} s" for name, value in plan.bounds.items()),
         f"steps: {plan.steps_per_frame} a frame, {plan.frames} frames, {plan.steps} in all",

@@ -14,6 +14,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.mpm.boundaries import Damping, Setting, prepare
 from jaxphys.mpm.grid import Grid
+from jaxphys.mpm.loop.implicit.step import check_implicit
 from jaxphys.mpm.loop.placement import suited
 from jaxphys.mpm.loop.sorting import cell_order, inverse_order
 from jaxphys.mpm.materials.catalogue import (
@@ -24,8 +25,8 @@ from jaxphys.mpm.materials.catalogue import (
 )
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Config, Model, State, initial_state
-from jaxphys.mpm.stepping import Fixed
-from jaxphys.mpm.stepping.fixed import choose_substep
+from jaxphys.mpm.stepping import Fixed, Implicit
+from jaxphys.mpm.stepping.frame_steps import frame_steps
 from jaxphys.mpm.transfer.kernels import Kernel
 from jaxphys.scene.look import Look, look_of
 from jaxphys.scene.obstacles import sampled
@@ -217,7 +218,11 @@ def build(
     parts = [particles_of(one, thing) for one, thing in zip(placed, scene.objects, strict=True)]
     arrangement = arrangement_of(parts, grid, scene.transfer.spline)
     config, model, state = solver_parts(scene, parts, arrangement, dtype)
-    dt, steps, _ = choose_substep(
+    stepping = scene.stepping or Fixed()
+    if isinstance(stepping, Implicit):
+        check_implicit(config, model)
+    dt, steps = frame_steps(
+        stepping,
         config,
         model,
         state,
@@ -236,7 +241,7 @@ def build(
         dt=dt,
         steps=steps,
         given_substep=scene.substep,
-        stepping=scene.stepping or Fixed(),
+        stepping=stepping,
     )
     solids: tuple = ()
     if scene.obstacle_colour is not None:

@@ -225,7 +225,8 @@ class Scene(Checked):
         fps: pictures a second of the video.
         frame_time: simulated time between pictures [s]; null: 1 / fps, real time.
         stepping: how a frame is stepped through: "fixed" takes equal steps, "adaptive" looks at the
-            bounds again every few steps. null: adaptive in films (`animate`, `generate`), and fixed
+            bounds again every few steps, "implicit" solves for the velocities, which pays for stiff
+            matter in slow motion. null: adaptive in films (`animate`, `generate`), and fixed
             elsewhere, where a gradient may be wanted.
         substep: time step [s], which makes steps fixed; null: as large as the bounds allow.
         unsafe_substep: take `substep` even beyond the bounds.

@@ -22,7 +22,7 @@ def floor(surface, friction):
     setting = Setting(Grid((11, 11, 11), 0.2), points, volume, np.dtype(np.float64))
     plane = Plane((0.0, 0.0, 0.5), (0.0, 0.0, 1.0), surface, friction, acts_on="particles")
     (made,) = prepare((plane,), setting)
-    loads = {"radius": made.radius, "stiffness": jnp.full(COUNT, K)}
+    loads = {"particle_radius": made.particle_radius, "stiffness": jnp.full(COUNT, K)}
     return made, loads, jnp.asarray(points.T)
 
 
@@ -45,7 +45,7 @@ def test_force_is_the_slope_and_pressure_that_of_explicit_steps(surface, frictio
     _, force = energy(start)
     np.testing.assert_allclose(-slope / DT, force, atol=1e-12)
     assert np.abs(force).max() > 0.01
-    given, _ = plane.impulse(x + DT * start, 0 * start, slip, loads, jnp.zeros(()), DT)
+    given, _ = plane.impulse(x + DT * start, 0 * start, slip, loads, jnp.zeros(()), DT, 0.0)
     np.testing.assert_allclose(force[2], given[2] / DT, atol=1e-12)
 
 

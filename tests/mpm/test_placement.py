@@ -165,7 +165,7 @@ def test_gradients_of_materials_and_boundaries(dtype, names, boundaries):
 
 @pytest.mark.parametrize("transfer", [Transfer(AFLIP(0.9)), Transfer(APIC(), "cubic")], ids=str)
 def test_transfers_on_slabs(transfer):
-    """Rows of eight numbers, and kernels that reach four nodes: bands carry both, forth and back."""
+    """Bands carry rows of eight numbers, and what kernels reach in four nodes; forth and back."""
     config, model, state = mixed(jnp.float64, EVERY_BOUNDARY[:1], ("jelly",), count=70)
     config = replace(config, transfer=transfer)
     whole = gradients(config, model, state)

@@ -5,7 +5,7 @@ import typing
 import pytest
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.stepping import Adaptive, Fixed
+from jaxphys.mpm.stepping import Adaptive, Fixed, Implicit
 from jaxphys.scene import (
     Box,
     Cut,
@@ -75,6 +75,9 @@ def test_a_stepping_is_read_by_its_type():
     assert read.stepping == Adaptive(every=4, safety=0.7)
     assert scene_from_json(to_json(read)) == read
     assert scene_from_json({"stepping": {"type": "fixed"}}).stepping == Fixed()
+    midpoint = scene_from_json({"stepping": {"type": "implicit", "theta": 0.5}})
+    assert midpoint.stepping == Implicit(theta=0.5)
+    assert scene_from_json(to_json(midpoint)) == midpoint
 
 
 @pytest.mark.parametrize(
@@ -83,6 +86,7 @@ def test_a_stepping_is_read_by_its_type():
         ({"stepping": {"type": "adaptiv"}}, ["scene.stepping.type", "did you mean 'adaptive'"]),
         ({"stepping": {"type": "fixed", "every": 2}}, ["scene.stepping", "'every'"]),
         ({"stepping": {"type": "adaptive", "safety": 0}}, ["safety", "above 0"]),
+        ({"stepping": {"type": "implicit", "theta": 0.3}}, ["theta", "at least 0.5"]),
         ({"gravty": [0, 0, 0]}, ["scene", "'gravty'", "did you mean 'gravity'"]),
         ({"gravity": [0, 0]}, ["scene.gravity", "3 values"]),
         ({"gravity": "down"}, ["scene.gravity", "list"]),

@@ -37,7 +37,7 @@ def lags(contact: Contact, loads: Parameters, position: Array, time: Array) -> t
     for face in contact.faces(position, time):
         if not face.keeps_slip:
             continue
-        radius = loads["radius"]
+        radius = loads["particle_radius"]
         if face.surface == "sticky":
             longest = jnp.where(radius - face.distance > -2 * radius, FAR, 0)
         else:
@@ -65,7 +65,7 @@ def pushed(
         position: (3, N) [m], that at the start and dt velocity.
         velocity: (3, N) [m/s]; time: [s] at the end; dt: [s].
     """
-    radius, kept = loads["radius"], 0
+    radius, kept = loads["particle_radius"], 0
     energy, force = jnp.zeros_like(radius), jnp.zeros_like(position)
     with part("contact"):
         for face in contact.faces(position, time):
@@ -119,7 +119,7 @@ def slipped(
         if face.keeps_slip:
             first = 3 * len(rows)
             moved = slip[first : first + 3] + dt * (velocity - face.velocity)
-            _, after = deflection(face, loads["radius"], moved)
+            _, after = deflection(face, loads["particle_radius"], moved)
             assert after is not None
             rows.append(after)
     return jnp.concatenate(rows)

@@ -83,14 +83,14 @@ def _hulls_in(config: Config, position: Array, order: Array) -> Array:
     return hulls(config, [cut(position, into, order) for into in parts])
 
 
-def windowed(config: Config, state: State) -> Config:
+def windowed(config: Config, state: State, *, slabs: bool = True) -> Config:
     """`config` with a window that has room for the particles of `state` and some motion, or with
     none where that would be no gain; and with slabs of it, where devices send less to each other
     with them. What it is depends on the state alone. Runs on the host.
     """
     config = replace(config, window=None, slabs=None)
     config = replace(config, window=_window(config, state))
-    return replace(config, slabs=_slabs(config, state))
+    return replace(config, slabs=_slabs(config, state) if slabs else None)
 
 
 def _window(config: Config, state: State) -> tuple[int, int, int] | None:

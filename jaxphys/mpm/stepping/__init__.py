@@ -2,5 +2,6 @@
 
 from .adaptive import Adaptive as Adaptive
 from .fixed import Fixed as Fixed
+from .implicit import Implicit as Implicit
 
-Stepping = Fixed | Adaptive
+Stepping = Fixed | Adaptive | Implicit

@@ -30,7 +30,7 @@ class Choice(NamedTuple):
         stepping: "explicit" or "implicit".
         explicit: steps in the time asked for, of one pass each.
         implicit: passes in that time.
-        ratio: of the lengths of the two steps.
+        length: of an implicit step [s]; ratio: to that of an explicit one.
         cells: along the longest path.
         reason: one line for a user.
     """
@@ -38,6 +38,7 @@ class Choice(NamedTuple):
     stepping: str
     explicit: float
     implicit: float
+    length: float
     ratio: float
     cells: float
     reason: str
@@ -62,7 +63,7 @@ def advised(explicit_dt: float, implicit_dt: float, cells: float, time: float) -
     )
     reason = f"implicit pays: {about}" if pays else f"explicit is cheaper: {about}"
     stepping = "implicit" if pays else "explicit"
-    return Choice(stepping, explicit, implicit, ratio, cells, reason)
+    return Choice(stepping, explicit, implicit, length, ratio, cells, reason)
 
 
 @jax.jit(static_argnums=0)

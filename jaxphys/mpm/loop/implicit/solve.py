@@ -14,8 +14,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.core.program import part
-from jaxphys.mpm.state import Config
-from jaxphys.mpm.stepping.implicit_grid import (
+from jaxphys.mpm.loop.implicit.grid import (
     Nodes,
     allowed,
     characteristic,
@@ -23,7 +22,7 @@ from jaxphys.mpm.stepping.implicit_grid import (
     precondition,
     project,
 )
-from jaxphys.mpm.stepping.implicit_passes import (
+from jaxphys.mpm.loop.implicit.passes import (
     Rest,
     Start,
     Tangents,
@@ -33,24 +32,14 @@ from jaxphys.mpm.stepping.implicit_passes import (
     multiply,
     springy,
 )
+from jaxphys.mpm.state import Config
+from jaxphys.mpm.stepping.implicit import Implicit
 
 HALVINGS = 12  # of a Newton step, before it counts as none
 LOOSEST = 0.5  # relative residual with which a linear system is left
 SHARE = 0.3  # of the tolerance that is enough for a linear system
 ROUNDING = 64  # of these may an energy rise by
 NOISE = 1.0  # of these is the least strain that a residual tells from rounding
-
-
-class Controls(NamedTuple):
-    """Static. tolerance: of `characteristic`; reduction: of its first value, what else it must fall
-    below; newton, products: most iterations of Newton's method, and most products of one linear
-    system.
-    """
-
-    tolerance: float
-    reduction: float
-    newton: int
-    products: int
 
 
 class Effort(NamedTuple):
@@ -178,7 +167,7 @@ class Search(NamedTuple):
     effort: Effort
 
 
-def newton(config: Config, controls: Controls, problem: Problem) -> tuple[Array, Array, Effort]:
+def newton(config: Config, stepping: Implicit, problem: Problem) -> tuple[Array, Array, Effort]:
     """(velocities (M, 4), whether they solve the problem (), what it took).
 
     A residual must be small beside stiffness and beside what it was: of stiff matter gravity itself
@@ -191,7 +180,7 @@ def newton(config: Config, controls: Controls, problem: Problem) -> tuple[Array,
     nodes = problem.nodes
     eps = float(jnp.finfo(nodes.mass.dtype).eps)
     # Where rounding ends it, the reduction need not be reached.
-    rounded = max(controls.tolerance, NOISE * eps)
+    rounded = max(stepping.tolerance, NOISE * eps)
 
     def solved(s: Search):
         ends = (s.strain <= s.goal) & (s.taken > 0)
@@ -210,7 +199,7 @@ def newton(config: Config, controls: Controls, problem: Problem) -> tuple[Array,
         found = point(config, problem, s.at.velocities + s.share * s.direction)
         strain = characteristic(nodes, project(nodes, found.residual))
         good = better(found, strain, s)
-        least = jnp.minimum(controls.tolerance, controls.reduction * strain)
+        least = jnp.minimum(stepping.tolerance, stepping.reduction * strain)
         goal = jnp.where(s.taken < 0, jnp.maximum(least, NOISE * eps), s.goal)
         s = s._replace(
             at=jax.tree.map(partial(jnp.where, good), found, s.at),
@@ -227,10 +216,10 @@ def newton(config: Config, controls: Controls, problem: Problem) -> tuple[Array,
         lost = ~good & (ends | (s.halvings >= HALVINGS))
         turns = (good | lost) & ~solved(s)
         stuck = lost & (s.convex | ends)
-        spent = s.spent | (turns & (s.effort.newton >= controls.newton))
+        spent = s.spent | (turns & (s.effort.newton >= stepping.newton))
         return jax.lax.cond(
             turns & ~stuck & ~spent,
-            partial(_turned, config, controls, problem, lost),
+            partial(_turned, config, stepping, problem, lost),
             lambda s: s._replace(stuck=stuck, spent=spent),
             s,
         )
@@ -266,13 +255,13 @@ def _balanced(problem: Problem, at: Point) -> Array:
     return jnp.where(nodes.filled, at.velocities - shift, at.velocities)
 
 
-def _turned(config, controls, problem, convex, s: Search) -> Search:
+def _turned(config, stepping, problem, convex, s: Search) -> Search:
     """With the direction of a further Newton step; convex: () bool, whether to leave out negative
     curvature from the first.
     """
     nodes = problem.nodes
     norm = partial(characteristic, nodes)
-    forcing = jnp.clip(jnp.sqrt(s.strain), SHARE * controls.reduction, LOOSEST)
+    forcing = jnp.clip(jnp.sqrt(s.strain), SHARE * stepping.reduction, LOOSEST)
     enough = jnp.where(s.strain > s.goal, SHARE * s.goal, 0)
     goal = jnp.maximum(forcing * s.strain, enough)
 
@@ -287,7 +276,7 @@ def _turned(config, controls, problem, convex, s: Search) -> Search:
                 norm,
                 project(nodes, -s.at.residual),
                 goal,
-                controls.products,
+                stepping.products,
             )
         effort = effort._replace(newton=effort.newton + 1, products=effort.products + products)
         return direction, jnp.array(True), positive | convex, effort
