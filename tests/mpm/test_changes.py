@@ -202,7 +202,6 @@ def test_what_cannot_be_is_refused(built, which):
 
 def test_another_name_of_a_parameter_is_converted():
     from jaxphys.mpm.materials.catalogue import MATERIALS
-    from jaxphys.mpm.materials.parameters import ALTERNATIVES
     from jaxphys.mpm.state import Config
 
     config, model, state = block(count=COUNT)
@@ -217,7 +216,8 @@ def test_another_name_of_a_parameter_is_converted():
     ratio = sine / np.sqrt(3)
     expected = np.degrees(np.arcsin(3 * ratio / (2 + ratio)))
     np.testing.assert_allclose(angle, expected, rtol=1e-12)
-    assert ALTERNATIVES["plane_strain_friction_angle"].name == "friction_angle"
+    other = MATERIALS["sand"].alternatives["plane_strain_friction_angle"]
+    assert other.instead_of == "friction_angle"
     with pytest.raises(InputError, match="given twice"):
         made.with_(plane_strain_friction_angle=40.0, friction_angle=30.0)
 
@@ -273,5 +273,5 @@ def test_beyond_the_step_traced_numbers_are_an_answer_or_a_failure():
     (value, motion), slope = run(stiff, Adaptive(most_steps=300))
     assert int(motion.status.code[1]) == OK and np.isfinite(slope) and slope != 0
     expected = rollout_frames(reference, 2)
-    np.testing.assert_allclose(motion.position[1], expected.position[1], atol=1e-3)
-    assert np.abs(expected.position[1] - expected.position[0]).max() > 1e-2
+    np.testing.assert_allclose(motion.position[1], expected.position[1], atol=5e-5)
+    assert np.abs(expected.position[1] - expected.position[0]).max() > 2e-3

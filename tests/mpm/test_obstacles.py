@@ -47,8 +47,8 @@ def ball_mesh(centre, diameter, **fields):
     return MeshObstacle(centre, "ball.stl", diameter, samples=ball_samples(), **fields)
 
 
-def ready(boundary, dtype=np.float64):
-    setting = Setting(Grid((12, 12, 12), H), np.array([[0.1, 0.1, 0.1]]), np.array([1e-6]), dtype)
+def ready(boundary, dtype=np.float64, place=(0.1, 0.1, 0.1)):
+    setting = Setting(Grid((12, 12, 12), H), np.array([place]), np.array([1e-6]), dtype)
     return boundary.prepared(setting)
 
 

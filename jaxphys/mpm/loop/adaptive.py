@@ -63,7 +63,7 @@ def rollout_adaptively(
     def block(carry):
         chunks, dt, left, taken, kept = carry
         bound, limit, particle = _look(passes, chunks, stepping.safety, *fixed)
-        bound = share * jnp.where(chunks.first, bound, jnp.minimum(bound, GROWTH * dt))
+        bound = jnp.where(chunks.first, share * bound, jnp.minimum(share * bound, GROWTH * dt))
         chunks = _told(chunks, bound, jnp.where(chunks.first, 0, dt), limit, particle)
         sound = chunks.status.code == OK
         count, ahead = next_steps(left, bound, most)

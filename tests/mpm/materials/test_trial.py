@@ -56,7 +56,9 @@ def test_response_is_the_slope_of_energy_and_the_tangent_that_of_the_response(la
     for k, (i, j) in enumerate((i, j) for i in range(3) for j in range(3)):
         way = jnp.zeros((3, 3, 1)).at[i, j].set(h)
         slope = (stored(TURNS + way) - stored(TURNS - way)) / (2 * h)
-        np.testing.assert_allclose(response[i, j], slope, atol=1e-6 * 1e3)
+        # A second derivative that jumps leaves a difference h / 4 of the jump away.
+        close = 1e-5 if law is FRACTURE else 1e-6
+        np.testing.assert_allclose(response[i, j], slope, atol=close * 1e3)
         change = (both(TURNS + way)[0] - both(TURNS - way)[0]) / (2 * h)
         if law is FRACTURE:
             # Tension starts at a strain of zero: no second derivative there.
