@@ -54,6 +54,7 @@ class _Source:
         single: whether it is one frame only, and so one file.
         rate: frames a second.
         inputs: every file that is read.
+        decides: the files that a run is known by.
         frames: gives the frames.
     """
 
@@ -62,6 +63,7 @@ class _Source:
     single: bool
     rate: float
     inputs: tuple[Path, ...]
+    decides: tuple[Path, ...]
     frames: Callable[[], Frames]
 
 
@@ -115,7 +117,7 @@ def export(
     identity = fingerprint(
         b"export",
         f"{to} {found.numbers}".encode(),
-        *(one.read_bytes() for one in found.inputs if one.name == CONFIG),
+        *(one.read_bytes() for one in found.decides),
     )
     names = {number: numbered_name(number, form.suffix) for number in found.numbers}
     with run_folder(
@@ -170,6 +172,7 @@ def _file(path: Path, frames: str | None) -> _Source:
         True,
         FILE_RATE,
         (path,),
+        (path,),
         lambda: [NumberedGaussians(0, gaussians)],
     )
 
@@ -183,6 +186,8 @@ def _run(folder: Path, asked: str | None) -> _Source:
         )
     scene = read_scene(config).scene.filmed()
     numbers, single = chosen_frames(asked, scene.frames)
+    # A run names its objects and obstacles alike whatever they are.
+    decides = (config, *sorted(folder.glob("*.ply")))
     kept = [folder / splats_name(number) for number in range(scene.frames)]
     # Frames are written last, after the checkpoint, which goes once they are whole.
     if all(path.is_file() for path in kept) and not (folder / FOLDER).exists():
@@ -192,7 +197,8 @@ def _run(folder: Path, asked: str | None) -> _Source:
             numbers,
             single,
             scene.fps,
-            (config, *files),
+            (*decides, *files),
+            decides,
             lambda: (
                 NumberedGaussians(number, read_ply(file))
                 for number, file in zip(numbers, files, strict=True)
@@ -200,9 +206,14 @@ def _run(folder: Path, asked: str | None) -> _Source:
         )
     scene = located(scene, folder)
     meshes = [mesh_file(scene, i) for i in mesh_obstacles(scene)]
-    inputs = (config, *source_files(scene, folder), *meshes)
     return _Source(
-        folder, numbers, single, scene.fps, inputs, lambda: _again(folder, scene, numbers)
+        folder,
+        numbers,
+        single,
+        scene.fps,
+        (*decides, *source_files(scene, folder), *meshes),
+        decides,
+        lambda: _again(folder, scene, numbers),
     )
 
 

@@ -177,6 +177,14 @@ def test_another_format_needs_to_be_told_to_replace(runs, tmp_path, capsys):
     assert sorted(contents(tmp_path / "out")) == names
 
 
+def test_another_object_of_the_same_scene_is_another_request(runs, tmp_path, capsys):
+    shutil.copytree(runs / "kept", tmp_path / "run")
+    assert export(tmp_path / "run", "spz", "--out", tmp_path / "out") == 0
+    shutil.copy(tmp_path / "run" / "splats" / "0002.ply", tmp_path / "run" / "gaussians.ply")
+    capsys.readouterr()
+    refused(capsys, export(tmp_path / "run", "spz", "--out", tmp_path / "out"), "another request")
+
+
 def test_what_fails_half_way_leaves_no_frame(runs, tmp_path, capsys):
     shutil.copytree(runs / "kept", tmp_path / "run")
     last = tmp_path / "run" / "splats" / "0002.ply"
