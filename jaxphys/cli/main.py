@@ -17,6 +17,7 @@ import tyro
 from jaxphys.cli import commands, weights
 from jaxphys.cli.devices import DEVICES, use_devices, without_devices
 from jaxphys.cli.evaluate import evaluate
+from jaxphys.cli.export import export
 from jaxphys.cli.fit import fit
 from jaxphys.cli.priors import priors
 from jaxphys.core.errors import InputError, one_line
@@ -58,6 +59,7 @@ def _dispatch(arguments: list[str]) -> int:
             "animate": commands.animate,
             "splat": commands.splat,
             "render": commands.render,
+            "export": export,
             "plan": commands.plan,
             "fit": fit,
             "materials": commands.materials,

@@ -31,6 +31,7 @@ from .mesh import load_mesh as load_mesh
 from .ply import read_ply as read_ply
 from .ply import write_ply as write_ply
 from .relax import blue_noise as blue_noise
+from .splat_file import read_splat as read_splat
 from .splat_file import write_splat as write_splat
 from .surface import gaussians_from_mesh as gaussians_from_mesh
 from .surface import sample_surface as sample_surface

@@ -42,7 +42,7 @@ _TYPES = {
     "double": "f8",
     "float64": "f8",
 }
-_ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
+ORDERS = {"ascii": "<", "binary_little_endian": "<", "binary_big_endian": ">"}
 _REST_COUNTS = {0: 0, 9: 1, 24: 2, 45: 3}
 _HEADER_LINES = 4096
 # A text line this long holds no row of numbers; a table this large is no scene that could be drawn.
@@ -93,17 +93,21 @@ def write_ply(path: str | os.PathLike, gaussians: Gaussians) -> None:
         file.write(table.tobytes())
 
 
-class _Element:
+class Element:
+    """An element of a header: its name, how many there are, and its properties as (name, type)."""
+
     def __init__(self, name: str, count: int):
         self.name, self.count = name, count
         self.properties: list[tuple[str, str]] = []
         self.has_list = False
 
     def dtype(self, order: str) -> np.dtype:
+        """Of one of them, in the byte order "<" or ">"."""
         return np.dtype([(name, order + kind) for name, kind in self.properties])
 
 
-def _read_header(file: BinaryIO, path) -> tuple[str, list[_Element]]:
+def read_header(file: BinaryIO, path) -> tuple[str, list[Element]]:
+    """The format's name and the elements; leaves `file` at the first byte of data."""
     if file.readline(16).rstrip() != b"ply":
         raise InputError(f"{path}: not a .ply file (it does not begin with 'ply'); give a .ply")
     style, elements = None, []
@@ -119,10 +123,10 @@ def _read_header(file: BinaryIO, path) -> tuple[str, list[_Element]]:
                 return style, elements
             case [] | ["comment" | "obj_info", *_]:
                 pass
-            case ["format", name, "1.0"] if name in _ORDERS:
+            case ["format", name, "1.0"] if name in ORDERS:
                 style = name
             case ["element", name, count] if count.isdecimal() and len(count) < 20:
-                elements.append(_Element(name, int(count)))
+                elements.append(Element(name, int(count)))
             case ["property", "list", *_] if elements:
                 elements[-1].has_list = True
             case ["property", kind, name] if elements and kind in _TYPES:
@@ -134,9 +138,9 @@ def _read_header(file: BinaryIO, path) -> tuple[str, list[_Element]]:
     raise InputError(f"{path}: the header has no end; the file is cut off or not a .ply")
 
 
-def _read_table(file: BinaryIO, path, style: str, elements: list[_Element], limit: int):
+def _read_table(file: BinaryIO, path, style: str, elements: list[Element], limit: int):
     """The vertex element as a structured array."""
-    before: list[_Element] = []
+    before: list[Element] = []
     for element in elements:
         if element.name == "vertex":
             break
@@ -152,7 +156,7 @@ def _read_table(file: BinaryIO, path, style: str, elements: list[_Element], limi
             f"{path}: {element.count} Gaussians, more than the limit of {limit}; thin it out or "
             f"raise `limit`"
         )
-    dtype = element.dtype(_ORDERS[style])
+    dtype = element.dtype(ORDERS[style])
     truncated = InputError(
         f"{path}: cut off: the header promises {element.count} Gaussians; copy the file again"
     )
@@ -213,7 +217,7 @@ def _read_lines(file: BinaryIO, path, skipped: int, count: int, width: int, trun
 def _require(path, table: dict[str, np.ndarray]) -> int:
     """The degree of the harmonics; InputError where a field is missing."""
     if "packed_position" in table:
-        raise InputError(f"{path}: a compressed .ply; export it uncompressed")
+        raise InputError(f"{path}: a compressed .ply; read it with `read_compressed_ply`")
     missing = [name for name in _fields(0) if name not in table and name not in _NORMAL]
     if missing:
         known = "a mesh or point cloud" if "f_dc_0" in missing else "an incomplete export"
@@ -270,7 +274,7 @@ def read_ply(
     """
     with reading(path) as path:
         with open(path, "rb") as file:
-            style, elements = _read_header(file, path)
+            style, elements = read_header(file, path)
             table = _read_table(file, path, style, elements, limit)
         return _gaussians(path, table, dtype, drop_invalid)
 

@@ -2,17 +2,28 @@
 
 import os
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.fields import LARGEST
 from jaxphys.core.files import atomic_path
+from jaxphys.core.reading import reading
 from jaxphys.core.rotations import normalise_quaternion
-from jaxphys.gaussians.gaussians import Gaussians, opacities, require_finite, scales
+from jaxphys.gaussians.gaussians import (
+    Gaussians,
+    from_points,
+    opacities,
+    require_finite,
+    scales,
+)
 from jaxphys.gaussians.harmonics import dc_to_rgb
 
 RECORD = np.dtype(
     [("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("quaternion", "u1", 4)]
 )
+
+LARGEST_FILE = 4 * 2**30
 
 
 def write_splat(path: str | os.PathLike, gaussians: Gaussians) -> None:
@@ -43,3 +54,34 @@ def write_splat(path: str | os.PathLike, gaussians: Gaussians) -> None:
     record["quaternion"] = np.clip(np.rint(128 * quaternions[order] + 128), 0, 255)
     with atomic_path(path) as aside:
         aside.write_bytes(record.tobytes())
+
+
+def read_splat(path: str | os.PathLike) -> Gaussians:
+    """Gaussians from the .splat file at `path`, float32, of degree 0.
+
+    Raises:
+        InputError: the file is missing, cut off, empty, or holds values that are not finite.
+    """
+    with reading(path, LARGEST_FILE) as path:
+        data = path.read_bytes()
+        if not data or len(data) % RECORD.itemsize:
+            raise InputError(
+                f"{len(data)} bytes are no whole number of Gaussians of {RECORD.itemsize}; the file"
+                " is cut off or no .splat"
+            )
+        record = np.frombuffer(data, RECORD)
+        for name, least in (("mean", -LARGEST), ("scale", 0)):
+            bad = ~((record[name] >= least) & (record[name] <= LARGEST)).all(axis=1)
+            if bad.any():
+                raise InputError(
+                    f"the {name} of {bad.sum()} of {bad.size} Gaussians (first: {np.argmax(bad)})"
+                    f" is not within {least:g} and {LARGEST:g}; export it again"
+                )
+        rgba = record["rgba"] / 255
+        return from_points(
+            jnp.asarray(record["mean"], jnp.float32),
+            rgba[:, :3],
+            record["scale"],
+            opacity=rgba[:, 3],
+            quaternions=(record["quaternion"].astype(np.float32) - 128) / 128,
+        )

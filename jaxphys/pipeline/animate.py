@@ -109,7 +109,7 @@ def products(scene: Scene, save_splats: bool) -> list[str]:
     """The names of all files that moving a scene may make."""
     splats = range(scene.frames if save_splats else 0)
     obstacles = _obstacle_names(scene).values()
-    return [*MADE, *UNFINISHED, *_object_names(scene), *obstacles, *map(_splats_name, splats)]
+    return [*MADE, *UNFINISHED, *_object_names(scene), *obstacles, *map(splats_name, splats)]
 
 
 def source_files(scene: Scene, beside: Path | None) -> list[Path]:
@@ -174,7 +174,7 @@ def animate_in(
     if save_splats:
         with timing.stage("splats"):
             for index, frame in enumerate(record.frames):
-                write_ply(folder.file(_splats_name(index)), deformed_gaussians(look, frame))
+                write_ply(folder.file(splats_name(index)), deformed_gaussians(look, frame))
     timing.write(folder.file("timing.json"))
     folder.remove(*UNFINISHED)
     return folder.path
@@ -192,7 +192,8 @@ def _obstacle_names(scene: Scene) -> dict[int, str]:
     return {i: f"obstacle_{i}.ply" for i in mesh_obstacles(scene)}
 
 
-def _splats_name(frame: int) -> str:
+def splats_name(frame: int) -> str:
+    """The file in a run's folder that holds the Gaussians of a frame, with `save_splats`."""
     return f"splats/{frame:04d}.ply"
 
 

@@ -4,11 +4,15 @@ from pathlib import Path
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.reading import reading
+from jaxphys.export.compressed_ply import is_compressed_ply, read_compressed_ply
+from jaxphys.export.spz import read_spz
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.gaussians.ply import read_ply
+from jaxphys.gaussians.splat_file import read_splat
 from jaxphys.scene.model_folder import splats_in
 from jaxphys.scene.scene import Object
 
+SPLATS = (".ply", ".spz", ".splat")
 MESHES = (".obj", ".glb", ".gltf", ".stl", ".off")
 
 
@@ -36,7 +40,8 @@ def load_object(thing: Object, beside: Path | None, seed: int, where: str) -> Ga
 
 
 def load(path: str | Path, *, count: int = 20_000, seed: int = 0) -> Gaussians:
-    """The Gaussians of a .ply file of splats, of a folder of them, or of a mesh.
+    """The Gaussians of a file of splats (.ply, compressed or not, .spz, .splat), of a folder of
+    them, or of a mesh.
 
     Args:
         path: the file; or a folder of `generate`, or of a trained model (see `splats_in`).
@@ -52,8 +57,8 @@ def load(path: str | Path, *, count: int = 20_000, seed: int = 0) -> Gaussians:
     suffix = path.suffix.lower()
     if not path.exists():
         raise InputError(f"{path}: no such file")
-    if suffix == ".ply":
-        gaussians = read_ply(path)
+    if suffix in SPLATS:
+        gaussians = _read(path, suffix)
         if not gaussians.count:
             raise InputError(f"{path}: holds no Gaussians; export it again")
         return gaussians
@@ -64,5 +69,14 @@ def load(path: str | Path, *, count: int = 20_000, seed: int = 0) -> Gaussians:
         with reading(path):
             return gaussians_from_mesh(load_mesh(path), count, seed)
     raise InputError(
-        f"{path}: neither splats (.ply) nor a mesh ({', '.join(MESHES)}); convert it to one"
+        f"{path}: neither splats ({', '.join(SPLATS)}) nor a mesh ({', '.join(MESHES)}); convert it"
+        " to one"
     )
+
+
+def _read(path: Path, suffix: str) -> Gaussians:
+    if suffix == ".spz":
+        return read_spz(path)
+    if suffix == ".splat":
+        return read_splat(path)
+    return read_compressed_ply(path) if is_compressed_ply(path) else read_ply(path)

@@ -29,6 +29,8 @@ FLAGS = {
         "--field-of-view": NUMBER, "--width": NUMBER, "--height": NUMBER, "--views": NUMBER,
         "--background": NUMBER,
     },
+    "export": {"--to": ("ply", "compressed-ply", "gltf", "spz", "usd", "x"),
+               "--frames": (*NUMBER, "0:1", ":", "1:0")},
     "plan": {"--material": TEXT, "--object": "file", "--json": None},
     "materials": {"--json": None},
     "evaluate": {"--prompt": TEXT, "--frames": NUMBER, "--clip": "file"},
@@ -69,7 +71,7 @@ def command_line(folder: Path, random: Random) -> list[str]:
         arguments += [random.choice(("", " ", "\x1b[31m", "\0", "x" * 5000))]
     elif command not in ("materials", "plan") or random.random() < 0.8:
         arguments += [str(folder / random.choice(FILES))] if random.random() < 0.9 else []
-    if command in ("generate", "image", "animate", "splat", "render"):
+    if command in ("generate", "image", "animate", "splat", "render", "export"):
         arguments += ["--out", str(folder / "out" / random.choice(("a", "a.png", "a.ply")))]
     flags = FLAGS[command]
     for flag in random.sample(list(flags), min(len(flags), random.choice((0, 1, 1, 2, 3)))):

@@ -1,5 +1,6 @@
 """Each reader with a small valid file of its own, and the ways in which that is spoiled."""
 
+import gzip
 import json
 from collections.abc import Callable
 from functools import partial
@@ -18,8 +19,10 @@ from trimesh.visual.material import PBRMaterial
 
 from jaxphys.cli.scenes import scene_for
 from jaxphys.evaluate.report import find_prompt
+from jaxphys.export import write_compressed_ply, write_spz
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.gaussians.ply import write_ply
+from jaxphys.gaussians.splat_file import write_splat
 from jaxphys.guidance.published.scheduler_config import SchedulerConfig
 from jaxphys.networks.clip_config import TextConfig
 from jaxphys.networks.clip_tokenizer import ClipTokenizer
@@ -90,6 +93,22 @@ def _ascii_splats(path: Path) -> None:
     lines = [" ".join(f"{value:g}" for value in row) for row in rows]
     text = header.decode().replace("binary_little_endian", "ascii") + "end_header\n"
     path.write_text(text + "\n".join(lines) + "\n")
+
+
+def _harmonics(path: Path) -> None:
+    """A compressed .ply or an .spz with harmonics."""
+    points = np.random.default_rng(0).normal(size=(4, 3)).astype(np.float32)
+    gaussians = from_points(points, np.full(3, 0.5), 0.1, degree=1)
+    (write_spz if path.suffix == ".spz" else write_compressed_ply)(path, gaussians)
+
+
+def _splat(path: Path) -> None:
+    points = np.random.default_rng(0).normal(size=(4, 3)).astype(np.float32)
+    write_splat(path, from_points(points, np.full(3, 0.5), 0.1))
+
+
+def _unzipped(data: bytes, random: Random) -> bytes:
+    return gzip.compress(BYTES(gzip.decompress(data), random))
 
 
 def _textured() -> trimesh.Trimesh:
@@ -229,6 +248,9 @@ BYTES = mutations.mutated_bytes
 CASES = {
     "ply": Case("a.ply", _splats, (BYTES, _ply_header), _load),
     "ascii ply": Case("a.ply", _ascii_splats, (BYTES, _text), _load),
+    "compressed ply": Case("a.ply", _harmonics, (BYTES, _ply_header), _load),
+    "spz": Case("a.spz", _harmonics, (BYTES, _unzipped, _unzipped), _load),
+    "splat": Case("a.splat", _splat, (BYTES,), _load),
     "obj": Case("a.obj", _obj, (_text, _text, BYTES), _load),
     "mtl": Case("m.mtl", lambda p: _obj(p.parent / "a.obj"), (_text, BYTES),
                 lambda p: _load(p.parent / "a.obj")),

@@ -1,0 +1,34 @@
+"""`jaxphys export`."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from tyro.conf import Positional
+
+
+def export(
+    source: Annotated[Positional[Path], tyro.conf.arg(metavar="RUN_DIR|FILE")],
+    /,
+    *,
+    to: Literal["ply", "compressed-ply", "gltf", "spz", "usd"],
+    out: Path | None = None,
+    frames: str | None = None,
+    overwrite: bool = False,
+) -> int:
+    """Write the frames of a run, or a file of splats, for other programs.
+
+    Args:
+        source: A directory made by animate or generate, or splats (.ply, .spz, .splat).
+        to: ply and compressed-ply: files as viewers of 3D Gaussian splatting read them; gltf: .glb
+            with KHR_gaussian_splatting; spz: the small format of Niantic's tools; usd: one .usda
+            with time samples. A run becomes one numbered file a frame, but for usd.
+        out: File, or for the frames of a run a directory: new, empty or of an earlier export.
+            Default: beside the source, named after it.
+        frames: Of a run, a:b from frame a to before frame b, or one number. Default: all.
+        overwrite: Replace what is there.
+    """
+    from jaxphys.pipeline.export import export as run
+
+    print(run(source, to, out, frames=frames, overwrite=overwrite, progress=True))
+    return 0
