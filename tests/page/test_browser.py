@@ -1,10 +1,6 @@
-"""The page in a real browser, from the disk and offline.
-
-Needs Debian's chromium and playwright, which no extra installs.
-"""
+"""The page in a real browser, from the disk and offline."""
 
 import io
-import shutil
 from types import SimpleNamespace
 
 import jax.numpy as jnp
@@ -17,31 +13,15 @@ from jaxphys.page.motion_data import pack
 from jaxphys.page.videos import videos_page
 from jaxphys.render.camera import orbit
 from jaxphys.render.renderer import render
+from tests.browsers import started, until
 from tests.page.moving import covariances, entry, tumbling, unpacked
 
 pytestmark = pytest.mark.slow
-FLAGS = [
-    "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
-]  # fmt: skip
 READ = """() => new Promise((done) => document.querySelector("canvas").toBlob(
   async (blob) => done([...new Uint8Array(await blob.arrayBuffer())])))"""
 
 
-@pytest.fixture(scope="module")
-def browser():
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
-    if program is None:
-        pytest.skip("NO BROWSER IS INSTALLED: no page was opened; apt-get install chromium")
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        pytest.skip("PLAYWRIGHT IS NOT INSTALLED: no page was opened; pip install playwright")
-    with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=program, args=FLAGS)
-        yield started
-        started.close()
+browser = pytest.fixture(scope="module")(started)
 
 
 @pytest.fixture
@@ -70,15 +50,6 @@ def opened(browser, tmp_path):
     yield open_page
     for context in contexts:
         context.close()
-
-
-def until(page, condition):
-    """Asks from outside: the page's policy lets nobody poll by evaluating text inside of it."""
-    for _ in range(600):
-        if page.evaluate(condition):
-            return
-        page.wait_for_timeout(100)
-    raise AssertionError(f"{condition} did not come true in a minute")
 
 
 def wait(page, frame):
