@@ -73,6 +73,9 @@ function clipOf(name, whenPlayed, whenBroken) {
     state.plays += 1;
     whenPlayed();
   };
+  video.onratechange = () => {
+    if (video.playbackRate !== 1) video.playbackRate = 1;
+  };
   video.onerror = whenBroken;
   return state;
 }
@@ -125,7 +128,7 @@ function ask(seat, answers) {
     element("p", { className: "small",
       textContent: "Page " + (answers.length + 1) + " of " + pages.length }),
     element("p", { textContent: page.prompt }),
-    element("div", { className: "pair" }, ...clips.map((clip) => clip.video)),
+    element("div", { className: clips.length > 1 ? "beside" : "" }, ...clips.map((clip) => clip.video)),
     element("p", { className: "question", textContent: question.text }),
     element("p", { textContent: page.note || "" }),
     group, told, next);
