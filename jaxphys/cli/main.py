@@ -19,7 +19,9 @@ from jaxphys.cli.devices import DEVICES, use_devices, without_devices
 from jaxphys.cli.evaluate import evaluate
 from jaxphys.cli.export import export
 from jaxphys.cli.fit import fit
+from jaxphys.cli.page import page
 from jaxphys.cli.priors import priors
+from jaxphys.cli.study import study
 from jaxphys.core.errors import InputError, one_line
 
 FAULT, REFUSED, INTERRUPTED, UNHEARD = 1, 2, 130, 141
@@ -65,6 +67,8 @@ def _dispatch(arguments: list[str]) -> int:
             "materials": commands.materials,
             "priors": priors,
             "evaluate": evaluate,
+            "page": page,
+            "study": study,
             "weights": weights.weights,
             "doctor": commands.doctor,
         },

@@ -3,11 +3,12 @@
 import dataclasses
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from jaxphys.core.checkpoints import fingerprint
-from jaxphys.core.files import aside_path
+from jaxphys.core.files import aside_path, atomic_path
 from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.core.run_folder import RunFolder, run_folder
 from jaxphys.gaussians.gaussians import Gaussians
@@ -19,6 +20,8 @@ from jaxphys.pipeline.film import Artist, film
 from jaxphys.pipeline.output import Timing, write_lines
 from jaxphys.pipeline.record import Record, recorded
 from jaxphys.pipeline.resume import FOLDER, MotionCheckpoint
+from jaxphys.pipeline.tell import NAME as REPORT
+from jaxphys.pipeline.tell import report_of
 from jaxphys.pipeline.video import write_picture
 from jaxphys.scene.build import build, validate
 from jaxphys.scene.json import to_json, write_scene
@@ -36,7 +39,14 @@ from jaxphys.scene.source import find, load_object
 Watch = Callable[[str, int], None]
 # What an unfinished run leaves, and a finished one takes away.
 UNFINISHED = ("motion.partial.mp4", "last_good.ply", "last_good.png", FOLDER)
-MADE = ("config.json", "motion.mp4", "contact_sheet.png", "metrics.jsonl", "timing.json")
+MADE = (
+    "config.json",
+    "motion.mp4",
+    "contact_sheet.png",
+    "metrics.jsonl",
+    "timing.json",
+    REPORT,
+)
 
 
 def animate(
@@ -55,9 +65,9 @@ def animate(
     """Simulates, draws and encodes a scene; returns the directory.
 
     The directory gets `config.json` (running it again gives the same bytes), `gaussians.ply`,
-    `motion.mp4`, `contact_sheet.png`, `metrics.jsonl`, `timing.json`, and with `save_splats` one
-    `splats/NNNN.ply` a frame. An interrupted run leaves a checkpoint there, and the same call
-    goes on.
+    `motion.mp4`, `contact_sheet.png`, `metrics.jsonl`, `timing.json`, a `report.html` that shows
+    and explains them, and with `save_splats` one `splats/NNNN.ply` a frame. An interrupted run
+    leaves a checkpoint there, and the same call goes on.
 
     Args:
         scene: what is asked for.
@@ -126,10 +136,15 @@ def animate_in(
     progress: bool,
     timing: Timing,
     watch: Watch | None,
+    prompt: Mapping[str, Any] | None = None,
 ) -> Path:
-    """As `animate`, into a folder in which the `products` of the scene are declared."""
+    """As `animate`, into a folder in which the `products` of the scene are declared.
+
+    Args:
+        prompt: what the folder's prompt.json holds, for the report; None: there is none.
+    """
     with timing.stage("build"):
-        simulation, look = build(scene, *objects)
+        simulation, look = built = build(scene, *objects)
     scene = _write_inputs(folder, scene, objects)
     identity = fingerprint(_text(scene), (simulation.model, simulation.state))
     checkpoint = MotionCheckpoint(folder.file(FOLDER), identity)
@@ -175,6 +190,10 @@ def animate_in(
         with timing.stage("splats"):
             for index, frame in enumerate(record.frames):
                 write_ply(folder.file(splats_name(index)), deformed_gaussians(look, frame))
+    with timing.stage("report"):
+        page = report_of(scene, built, record.metrics, prompt or {})
+        with atomic_path(folder.file(REPORT)) as beside:
+            beside.write_text(page, encoding="utf-8")
     timing.write(folder.file("timing.json"))
     folder.remove(*UNFINISHED)
     return folder.path

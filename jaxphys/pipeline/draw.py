@@ -49,12 +49,12 @@ def frame_splats(look: Look, frame: Frame, eye: Array) -> Splats:
             splats = jax.tree.map(lambda *both: jnp.concatenate(both), splats, rest)
     if look.solids:
         with part("obstacles"):
-            rest = [to_splats(one, eye) for one in _solids(look, frame)]
+            rest = [to_splats(one, eye) for one in placed_solids(look, frame)]
             splats = jax.tree.map(lambda *all: jnp.concatenate(all), splats, *rest)
     return splats
 
 
-def _solids(look: Look, frame: Frame) -> list[Gaussians]:
+def placed_solids(look: Look, frame: Frame) -> list[Gaussians]:
     """The obstacles that are drawn, where they are at the time of a frame."""
     placed = []
     for gaussians, obstacle in look.solids:
@@ -101,5 +101,5 @@ def deformed_gaussians(look: Look, frame: Frame) -> Gaussians:
     frame.check()
     moved = bake(look.gaussians, *frame.carried())
     still = [] if look.still is None else [look.still]
-    rest = [*still, *_solids(look, frame)]
+    rest = [*still, *placed_solids(look, frame)]
     return concatenate([moved, *rest]) if rest else moved

@@ -99,7 +99,8 @@ def generate(
                 gaussians = _gaussians(refinement, scene, generation, folder, progress)
                 made = {"shape_prior": generation.shape_prior}
         made = {"prior": generation.prior, **made}
-        write_json(folder.file(PROMPT), {**dataclasses.asdict(refinement), "made_by": made})
+        told = {**dataclasses.asdict(refinement), "made_by": made}
+        write_json(folder.file(PROMPT), told)
         return animate_in(
             folder,
             scene,
@@ -108,6 +109,7 @@ def generate(
             progress=progress,
             timing=timing,
             watch=watch,
+            prompt=told,
         )
 
 

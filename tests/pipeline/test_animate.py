@@ -21,7 +21,14 @@ from jaxphys.scene import (
     read_scene,
 )
 
-FILES = ("config.json", "gaussians.ply", "motion.mp4", "metrics.jsonl", "contact_sheet.png")
+FILES = (
+    "config.json",
+    "gaussians.ply",
+    "motion.mp4",
+    "metrics.jsonl",
+    "contact_sheet.png",
+    "report.html",
+)
 
 
 def sphere(count=200):
