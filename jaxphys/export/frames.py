@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxphys.core.ellipsoid_axes import unit
 from jaxphys.core.errors import InputError
 from jaxphys.core.fields import LARGEST
 from jaxphys.gaussians.gaussians import LOG_SCALE_LIMIT, Gaussians, require_finite
@@ -72,10 +73,3 @@ def plain(gaussians: Gaussians, source: str) -> Plain:
         1 / (1 + np.exp(-np.clip(logits, -50, 50))),
         harmonics,
     )
-
-
-def unit(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions (N, 4) of unit length; a zero one becomes no rotation."""
-    length = np.linalg.norm(quaternions, axis=1, keepdims=True)
-    usable = length > 1e-12
-    return np.where(usable, quaternions / np.where(usable, length, 1), [1.0, 0.0, 0.0, 0.0])

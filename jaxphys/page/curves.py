@@ -1,4 +1,4 @@
-"""Curves over time as inline SVG, without scripts."""
+"""Curves as inline SVG, without scripts."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -23,15 +23,20 @@ def ticks(low: float, high: float, count: int = TICKS) -> list[float]:
 
 
 def curves(
-    times: Sequence[float], values: Mapping[str, Sequence[float]], unit: str, title: str
+    times: Sequence[float],
+    values: Mapping[str, Sequence[float]],
+    unit: str,
+    title: str,
+    along: str = "time [s]",
 ) -> str:
-    """A chart of some curves over time.
+    """A chart of some curves over time, or over what else rises.
 
     Args:
-        times: [s], rising.
+        times: rising.
         values: by name; what is not finite is left out.
         unit: of the values.
         title: what the chart shows, for those who do not see it.
+        along: what `times` are.
 
     Returns:
         An svg element and a line that says which curve is which.
@@ -66,7 +71,7 @@ def curves(
         )
     parts.append(
         f'<text x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 4}" text-anchor="middle"'
-        ' fill="#565656">time [s]</text>'
+        f' fill="#565656">{escaped(along)}</text>'
     )
     for i, curve in enumerate(values.values()):
         points = " ".join(

@@ -15,8 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from jaxphys.core.ellipsoid_axes import nearest_axes, unit
 from jaxphys.core.errors import InputError
-from jaxphys.page.quantise import SHAPE_LEVELS, continued, quantised, quantised_rotations
+from jaxphys.page.quantise import SHAPE_LEVELS, quantised, quantised_rotations
 
 FEWEST_FRAMES = 24  # frames are left out down to these before Gaussians are
 FEWEST_GAUSSIANS = 64
@@ -138,6 +139,16 @@ def every(moving: Moving, stride: int) -> Moving:
         log_scales=moving.log_scales[::stride],
         seconds=moving.seconds[::stride],
     )
+
+
+def continued(quaternions: np.ndarray, log_scales: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same ellipsoids (T, N, 4) and (T, N, 3), each frame's axes named after those before it.
+    Words then change little from frame to frame, and compress.
+    """
+    q, s = unit(np.array(quaternions, np.float64)), np.array(log_scales, np.float64)
+    for t in range(1, len(q)):
+        q[t], s[t] = nearest_axes(q[t - 1], q[t], s[t])
+    return q, s
 
 
 def _packed(moving: Moving) -> tuple[dict[str, Any], str]:

@@ -1,22 +1,27 @@
 """A fit in a folder of its own: results, curves, and the fit beside what was observed."""
 
+import math
 import os
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
 from jaxphys.core.checkpoints import Checkpoints, fingerprint
-from jaxphys.core.files import aside_path
+from jaxphys.core.files import aside_path, atomic_path
 from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.core.run_folder import run_folder
 from jaxphys.fitting.config import read_config
 from jaxphys.fitting.evaluation import Memory
 from jaxphys.fitting.fit import fit
+from jaxphys.fitting.layout import layout
 from jaxphys.fitting.observed import Images, Masks, Observed, Points, Tracks
 from jaxphys.fitting.result import ARRAYS, HISTORY, RESULT, Fit
 from jaxphys.gaussians.gaussians import from_points, to_splats
+from jaxphys.page.curves import curves
+from jaxphys.page.html import bundled, document
 from jaxphys.pipeline.draw import draw
 from jaxphys.pipeline.framing import frame_cameras
 from jaxphys.pipeline.video import VideoWriter
@@ -27,7 +32,7 @@ from jaxphys.scene.read import read_scene
 from jaxphys.scene.source import find, load_object
 from jaxphys.scene.view import View
 
-EVALUATIONS, CURVES, VIDEO = "evaluations/", "curves.png", "comparison.mp4"
+EVALUATIONS, CURVES, VIDEO = "evaluations/", "curves.html", "comparison.mp4"
 PRODUCTS = (RESULT, ARRAYS, HISTORY, CURVES, VIDEO, EVALUATIONS)
 SIDE = 360  # of a picture of dots [pixels]
 SEEN, FITTED = (0.85, 0.3, 0.1), (0.1, 0.35, 0.8)
@@ -43,7 +48,7 @@ def fit_file(
     watch: Callable[[int], None] | None = None,
 ) -> Fit:
     """Fits what a config asks for; `out` gets `result.json`, `values.npz`, `history.jsonl`,
-    `curves.png` and `comparison.mp4`. An interrupted fit keeps its evaluations there, and the same
+    `curves.html` and `comparison.mp4`. An interrupted fit keeps its evaluations there, and the same
     call goes on, to the same bytes.
 
     Args:
@@ -69,6 +74,7 @@ def fit_file(
     ]
     simulation, look = build(scene, *objects)
     observed = [one.read(path.parent) for one in config.observed]
+    layout(config.free, simulation, look)  # a wrong name is told before anything is made
     sources = [find(thing.source, beside) for thing in scene.objects if thing.source is not None]
     inputs = [path, path.parent / config.scene, *sources]
     inputs += [one.path(path.parent) for one in config.observed]
@@ -81,11 +87,12 @@ def fit_file(
             deferred_interrupt() as interrupted,
             tqdm(desc="fit", unit="evaluation", disable=not progress) as bar,
         ):
+            made = count(1)
 
             def after():
                 bar.update()
                 if watch is not None:
-                    watch(bar.n)
+                    watch(next(made))
                 if interrupted():
                     raise KeyboardInterrupt
 
@@ -108,7 +115,8 @@ def fit_file(
                 memory.save()
                 raise
         found.write(folder)
-        draw_curves(folder.file(CURVES), found)
+        with atomic_path(folder.file(CURVES)) as beside:
+            beside.write_text(curves_of(found), encoding="utf-8")
         video = folder.file(VIDEO)
         aside = aside_path(video)
         try:
@@ -120,24 +128,20 @@ def fit_file(
     return found
 
 
-def draw_curves(path: Path, found: Fit) -> None:
-    """The loss, and each number where there are few, over the steps of the search."""
-    from matplotlib.figure import Figure
-
+def curves_of(found: Fit) -> str:
+    """A document of the loss, and of each number where there are few, over the steps of the search,
+    those that failed left out.
+    """
     rows = [row for row in found.history if row["loss"] is not None]
-    names = list(rows[0].get("values", {})) if rows else []
-    figure = Figure(figsize=(6, 2.2 * (1 + len(names))), layout="constrained")
-    axes = figure.subplots(1 + len(names), 1, sharex=True, squeeze=False)[:, 0]
-    axes[0].semilogy([row["loss"] for row in rows])
-    axes[0].set_ylabel("loss")
-    for name, axis in zip(names, axes[1:], strict=True):
-        curve = np.array([np.ravel(row["values"][name]) for row in rows])
-        axis.plot(curve)
-        axis.set_ylabel(name)
-        if np.all(curve > 0) and curve.max() > 10 * curve.min():
-            axis.set_yscale("log")
-    axes[-1].set_xlabel("step")
-    figure.savefig(path, format="png", dpi=110)
+    steps = [float(step) for step in range(len(rows))]
+    loss = [math.log10(max(row["loss"], 1e-300)) for row in rows]
+    charts = [curves(steps, {"loss": loss}, "logarithm to base 10", "Loss", along="step")]
+    for name in rows[0].get("values", {}) if rows else ():
+        parts = np.array([np.ravel(row["values"][name]) for row in rows], float).T
+        values = {f"{i}" if len(parts) > 1 else name: part.tolist() for i, part in enumerate(parts)}
+        charts.append(curves(steps, values, "SI units", name, along="step"))
+    body = "".join(f"<div>{chart}</div>\n" for chart in charts)
+    return document("fit", f"<main>\n{body}</main>", style=bundled("page.css"))
 
 
 def film_comparison(path: Path, found: Fit, observed: Observed) -> None:

@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxphys.core.ellipsoid_axes import CUBE
 from jaxphys.core.rotations import axis_angle_to_matrix, matrix_to_quaternion
 from jaxphys.export import NumberedGaussians, continuous_axes
-from jaxphys.export.continuous_axes import _CUBE
 from jaxphys.gaussians import Gaussians
 from jaxphys.pipeline.deform import bake
 from tests.export.cases import angles_signed, cloud, covariances, rotation
@@ -96,12 +96,12 @@ def test_round_gaussians_do_not_spin(log_scales):
 
 def test_every_relabelling_is_undone():
     """The 24 rotations of a cube, either sign: all are the same Gaussian, and are told to be."""
-    assert len({m.tobytes() for m in _CUBE + 0.0}) == 24
-    np.testing.assert_allclose(np.linalg.det(_CUBE), 1)
+    assert len({m.tobytes() for m in CUBE + 0.0}) == 24
+    np.testing.assert_allclose(np.linalg.det(CUBE), 1)
     given = rest([-5.0, -4.0, -2.0])
     axes = rotation(given.quaternions)
     first = NumberedGaussians(0, given)
-    for matrix in _CUBE:
+    for matrix in CUBE:
         quaternions = matrix_to_quaternion(jnp.asarray(axes @ matrix, jnp.float32))
         scales = jnp.asarray(np.asarray(given.log_scales) @ np.abs(matrix), jnp.float32)
         for sign in (1, -1):

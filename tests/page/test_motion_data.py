@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from jaxphys.core.ellipsoid_axes import CUBE, CUBE_QUATERNIONS
 from jaxphys.core.errors import InputError
-from jaxphys.page.motion_data import every, pack, some_of
-from jaxphys.page.quantise import CAME_FROM, TURNS, continued
+from jaxphys.page.motion_data import continued, every, pack, some_of
 from tests.page.moving import covariances, rotation, tumbling, unpacked
 
 ROOM = 4_000_000
@@ -44,8 +44,10 @@ def test_naming_axes_anew_changes_no_ellipsoid_and_keeps_them_near():
 
     for t in range(len(shuffled_q)):
         which = random.integers(24, size=50)
-        shuffled_q[t] = product(shuffled_q[t], TURNS[which])
-        shuffled_s[t] = np.take_along_axis(shuffled_s[t], CAME_FROM[which], -1)
+        shuffled_q[t] = product(shuffled_q[t], CUBE_QUATERNIONS[which])
+        shuffled_s[t] = np.take_along_axis(
+            shuffled_s[t], np.argmax(np.abs(CUBE), axis=1)[which], -1
+        )
     unit = shuffled_q / np.linalg.norm(shuffled_q, axis=-1, keepdims=True)
     q, s = continued(unit, shuffled_s)
     assert covariances(q, s) == pytest.approx(
@@ -54,8 +56,11 @@ def test_naming_axes_anew_changes_no_ellipsoid_and_keeps_them_near():
     nearness = np.abs(np.sum(q[1:] * q[:-1], -1))
     assert nearness.min() > np.cos(0.15 / 2) - 1e-9  # what it really turned between frames
     assert np.abs(np.diff(s, axis=0)).max() < 0.021
-    assert sorted({tuple(np.round(rotation(t)).ravel()) for t in TURNS}) and len(TURNS) == 24
-    assert len({tuple(np.round(rotation(t)).ravel()) for t in TURNS}) == 24
+    assert (
+        sorted({tuple(np.round(rotation(t)).ravel()) for t in CUBE_QUATERNIONS})
+        and len(CUBE_QUATERNIONS) == 24
+    )
+    assert len({tuple(np.round(rotation(t)).ravel()) for t in CUBE_QUATERNIONS}) == 24
 
 
 def test_what_does_not_fit_loses_frames_first_and_then_gaussians_and_says_so():

@@ -33,7 +33,7 @@ def scene(material="elastic", **changes):
         thing["parameters"] = {"youngs_modulus": 3e6, "density": 1000.0}
     written = {
         "objects": [thing],
-        "boundaries": [{"type": "plane", "point": [0, 0, 0.23], "friction": 0.3}],
+        "boundaries": [{"type": "plane", "point": [0, 0, 0.18], "friction": 0.3}],
         "domain": {"size": [1.0, 1.0, 1.0], "spacing": 0.1},
         "frame_time": 0.03,
         "frames": 3,
@@ -43,7 +43,9 @@ def scene(material="elastic", **changes):
 
 
 def test_frames_are_those_of_explicit_steps():
-    """To what backward Euler damps of the first fall: a tenth of the way that it goes."""
+    """The middle falls as far. On the floor it slides a little further: backward Euler does not
+    leap up again, so that it is pressed, and rubs, half as much.
+    """
     asked = scene()
     assert asked.stepping == Implicit()
     built = build(asked, GAUSSIANS)
@@ -51,9 +53,11 @@ def test_frames_are_those_of_explicit_steps():
     explicit = simulate(build(replace(asked, stepping=Adaptive()), GAUSSIANS).simulation, 3)
     assert implicit.status.taken[-1] < 0.3 * explicit.status.taken[-1]
     np.testing.assert_allclose(implicit.time, [0, 0.03, 0.06], rtol=1e-6)
-    way = np.abs(explicit.position[-1] - explicit.position[0]).max()
-    assert way > 0.02
-    assert np.abs(implicit.position - explicit.position).max() < 0.1 * way
+    here, there = (motion.position.mean(axis=1) for motion in (implicit, explicit))
+    np.testing.assert_allclose(here[1], there[1], atol=5e-4)
+    slid, other = (middle[2, 0] - middle[0, 0] for middle in (here, there))
+    assert 0.8 * slid < other < slid < 0.4 * 0.06 and here[0, 2] - here[1, 2] > 0.003
+    assert implicit.position[-1][:, 2].min() > 0.18 + 0.05
     plan = describe(asked, built)
     assert "implicit step" in plan.included and plan.stepping.startswith("implicit")
     assert plan.steps_per_frame <= 5 and "an implicit step is" in plan.advice
@@ -78,7 +82,8 @@ def test_a_step_and_implicit_ones_exclude_each_other():
 
 @pytest.mark.slow
 def test_the_gradient_of_a_motion_is_that_of_central_differences():
-    simulation = build(scene(), GAUSSIANS).simulation
+    exact = Implicit(tolerance=1e-12, reduction=1e-12)
+    simulation = build(scene(stepping=exact), GAUSSIANS).simulation
     weights = np.random.default_rng(0).normal(size=(2, 64, 3))
 
     def loss(scale):

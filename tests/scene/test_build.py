@@ -85,7 +85,8 @@ def test_only_what_is_inside_the_area_moves():
 
 def test_a_transfer_goes_from_json_into_the_step():
     asked = {"scheme": {"type": "flip", "blend": 0.9}, "kernel": "cubic"}
-    read = scene_from_json(to_json(scene()) | {"transfer": asked})
+    hard = replace(scene(parameters={"youngs_modulus": 1e6}), frame_time=0.01)
+    read = scene_from_json(to_json(hard) | {"transfer": asked})
     assert read.transfer == Transfer(FLIP(0.9), "cubic") and to_json(read)["transfer"] == asked
     simulation, _ = build(read, GAUSSIANS)
     config, model, state = simulation.config, simulation.model, simulation.state
@@ -95,7 +96,7 @@ def test_a_transfer_goes_from_json_into_the_step():
     assert int(end.status.code) == 0 and int(end.status.taken) == 2
     # A longer swing of a particle alone: 2 / sqrt(3) of the step of quadratic splines for APIC, and
     # without an affine part 1 / sqrt(2) of that.
-    plain = build(scene(), GAUSSIANS).simulation
+    plain = build(hard, GAUSSIANS).simulation
     assert plain.config.transfer == Transfer(APIC(), "quadratic")
     assert plain.steps < simulation.steps < 1.5 * plain.steps
 
