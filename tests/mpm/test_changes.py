@@ -147,6 +147,19 @@ def test_regions_choose_anew(built):
     )
 
 
+def test_a_place_of_which_one_number_is_traced(built):
+    """As a user writes it: a tuple with an unknown height in it."""
+
+    def normal(height):
+        changed = built.with_(boundaries={3: {"normal": (0.0, 2.0, height)}})
+        return changed.model.boundaries[3].normal
+
+    slope = jax.jacfwd(normal)(0.0)
+    np.testing.assert_allclose(slope, [0.0, 0.0, 1.0], atol=1e-12)
+    with pytest.raises(InputError, match="shape"):
+        jax.eval_shape(lambda h: built.with_(boundaries={3: {"normal": (0.0, h)}}), 0.0)
+
+
 def test_a_force_on_each_particle_follows_the_choice(built):
     """Of 1 N each, shared by mass among those that are in the box."""
     for size in ((0.08, 0.2, 0.2), (0.3, 0.06, 0.3)):

@@ -243,7 +243,7 @@ class Boundary(Numbers):
 
 def changed_number(name: str, now: Array, value: Any, rules: Mapping[str, Any]) -> Array:
     """`value` in place of the number `now`, checked by the rules of its field where it is known."""
-    if not isinstance(value, jax.core.Tracer):
+    if not any(isinstance(part, jax.core.Tracer) for part in jax.tree.leaves(value)):
         known = np.asarray(value, np.float64)
         check_value(name, plain(known), rules)
     array = jnp.asarray(value, now.dtype)

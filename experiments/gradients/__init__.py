@@ -1,0 +1,1 @@
+"""Derivatives of every axis against differences."""
