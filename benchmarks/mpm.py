@@ -6,7 +6,6 @@ grid, as a run has them. Work is counted in particle-steps.
 """
 
 import time
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -66,9 +65,9 @@ def start_devices(number: int | None = None) -> None:
     jax.config.update("jax_num_cpu_devices", number or cores())
 
 
-def model_and_state(case: dict, devices: int | None = None, *, slabs: bool = True):
+def model_and_state(case: dict, devices: int | None = None, *, slabs: bool | None = None):
     """(config, model, state) of a `block_case` in float32, on all devices or `devices` of them;
-    slabs: each may have its own of the grid, where that suits.
+    slabs: as for `windowed`.
     """
     import jax.numpy as jnp
 
@@ -95,11 +94,10 @@ def model_and_state(case: dict, devices: int | None = None, *, slabs: bool = Tru
         gravity=jnp.array(case["gravity"], jnp.float32),
     )
     state = initial_state(config, case["position"], case["velocity"], dtype=jnp.float32)
-    config = windowed(config, state)
-    return config if slabs else replace(config, slabs=None), model, state
+    return windowed(config, state, slabs=slabs), model, state
 
 
-def forward(case: dict, steps: int, devices: int | None = None, *, slabs: bool = True):
+def forward(case: dict, steps: int, devices: int | None = None, *, slabs: bool | None = None):
     """A compiled `() -> State` that runs `steps` steps from the case's start."""
     import jax
 

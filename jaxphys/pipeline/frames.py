@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from jaxphys.mpm.loop.frames import next_frame, shares_the_grid
+from jaxphys.mpm.loop.frames import next_frame, slabs_for
 from jaxphys.mpm.loop.status import check
 from jaxphys.mpm.loop.window import windowed
 from jaxphys.mpm.materials.fracture import number_of_pieces
@@ -122,7 +122,7 @@ def frames(
         yield _moment(simulation, simulation.state, 0, particles)
     number, state = start
     config, model = simulation.config, simulation.model
-    cut = partial(windowed, slabs=shares_the_grid(simulation.stepping))
+    cut = partial(windowed, slabs=slabs_for(simulation.stepping))
     if config.placement.devices > 1:
         # Where the frames leave it, so that the first one is no program of its own.
         model, state = jax.device_put((model, state), config.placement.everywhere())

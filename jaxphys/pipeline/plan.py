@@ -20,7 +20,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.program import parts
 from jaxphys.gaussians.gaussians import Gaussians, from_points, transform
 from jaxphys.mpm.loop.chunks import cuts
-from jaxphys.mpm.loop.frames import shares_the_grid
+from jaxphys.mpm.loop.frames import slabs_for
 from jaxphys.mpm.loop.halo import sent_bytes
 from jaxphys.mpm.loop.implicit.step import check_implicit, implicit_step
 from jaxphys.mpm.loop.rollout import step
@@ -232,7 +232,7 @@ def describe(scene: Scene, built: Built) -> Plan:
     included, left_out = _facts(scene, built)
     bounds = largest_stable_dt(simulation.config, simulation.model, simulation.state)
     reason = bounds.reason if scene.substep is None else "the scene's own substep"
-    slabs = shares_the_grid(simulation.stepping)
+    slabs = slabs_for(simulation.stepping)
     first = windowed(simulation.config, simulation.state, slabs=slabs)
     placement, transfer = simulation.config.placement, simulation.config.transfer
     row, stencil = 4 * transfer.columns, transfer.spline.width**3

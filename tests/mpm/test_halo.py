@@ -148,25 +148,31 @@ def test_bands_are_all_that_a_compiled_exchange_sends():
 
 def test_slabs_where_devices_then_send_less():
     whole, _, state = long_block(devices=2)
-    config = windowed(whole, state)
+    config = windowed(whole, state, slabs=True)
     # Half of 24 cells, the nodes beside them and room; three planes, room for a step and more.
     assert config.slabs == Slabs(20, (8,))
     assert config.nodes == (20, 10, 11)
     # What it is depends on the state alone, not on the order of the particles.
-    assert windowed(config, state) == config
+    assert windowed(config, state, slabs=True) == config
     backwards = state._replace(position=state.position[:, ::-1])
-    assert windowed(config, backwards) == config
+    assert windowed(config, backwards, slabs=True) == config
     # One device; particles in one place; many devices, all of which share nodes.
-    assert windowed(replace(whole, placement=Placement()), state).slabs is None
+    assert windowed(replace(whole, placement=Placement()), state, slabs=True).slabs is None
     together = state._replace(position=0 * state.position + 0.5)
-    assert windowed(whole, together).slabs is None
+    assert windowed(whole, together, slabs=True).slabs is None
     short, _, short_state = long_block(cells=4, devices=4)
-    assert windowed(short, short_state).slabs is None
+    assert windowed(short, short_state, slabs=True).slabs is None
+    # Of one memory two devices have windows unless they are told to, and more have slabs.
+    assert windowed(whole, state).slabs is None
+    more, _, same = long_block(devices=4)
+    assert (
+        windowed(more, same).slabs is not None and windowed(more, same, slabs=False).slabs is None
+    )
 
 
 def test_particles_are_sorted_where_slabs_would_not_hold_them():
     config, _, state = long_block(devices=2)
-    config = windowed(config, state)
+    config = windowed(config, state, slabs=True)
     find = jax.jit(partial(orders_for, config))
     as_they_are = np.arange(200)
     np.testing.assert_array_equal(find(state.position)[0], as_they_are)

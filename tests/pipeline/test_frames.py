@@ -85,10 +85,10 @@ def test_a_particle_that_crosses_slabs_in_a_frame_is_not_lost(crossing):
         np.testing.assert_allclose(ours.metrics[total], theirs.metrics[total], rtol=1e-6, atol=1e-6)
 
 
-@pytest.mark.skipif(jax.device_count() < 2, reason="needs two host devices")
+@pytest.mark.skipif(jax.device_count() < 4, reason="needs four host devices")
 def test_a_run_goes_on_with_another_number_of_devices():
     still = simulation_of(*long_block(), dt=DT, steps=STEPS)
-    many = replace(still, config=replace(still.config, placement=Placement(2, 16)))
+    many = replace(still, config=replace(still.config, placement=Placement(4, 16)))
     assert windowed(many.config, many.state).slabs is not None
     *_, end = islice(frames(still), 3)
     *_, middle = islice(frames(many), 2)

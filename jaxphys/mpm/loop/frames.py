@@ -161,9 +161,11 @@ def advance_implicitly(
     return implicit_rollout(config, model, state, time=duration, stepping=stepping, share=share)[0]
 
 
-def shares_the_grid(stepping: Stepping) -> bool:
-    """Whether several devices may each have a slab of the grid; implicit solves need all of it."""
-    return not isinstance(stepping, Implicit)
+def slabs_for(stepping: Stepping) -> bool | None:
+    """Whether several devices may each have a slab of the grid, for `windowed`: implicit solves
+    need all of it.
+    """
+    return False if isinstance(stepping, Implicit) else None
 
 
 def next_frame(
