@@ -104,7 +104,8 @@ def _window(config: Config, state: State) -> tuple[int, int, int] | None:
     nodes = math.prod(config.grid.shape)
     if nodes < WORTH * config.particles:
         return None
-    shape = np.minimum(_with_room(config, _span(config, state.position)), config.grid.shape)
+    wanted = _with_room(config, _span(config, state.position))
+    shape = np.minimum([_of_few(int(count)) for count in wanted], config.grid.shape)
     if 2 * math.prod(shape.tolist()) > nodes:
         return None
     x, y, z = shape.tolist()
@@ -132,6 +133,16 @@ def _slabs(config: Config, state: State) -> Slabs | None:
 def _with_room(config: Config, span):
     """Nodes for a span of cells, with room for what a frame adds."""
     return _rounded_up(np.ceil(GROWTH * np.asarray(span) + config.kernel.width + MARGIN))
+
+
+def _of_few(count: int) -> int:
+    """The next of 8, 12, 16, 24, 32, 48, ...: a body that swings would otherwise have many windows,
+    each of which is seconds of compilation, where a node is a hundredth of a particle.
+    """
+    size = 8
+    while size < count:
+        size = 3 * size // 2 if size & (size - 1) == 0 else 4 * size // 3
+    return size
 
 
 def _rounded_up(count):
