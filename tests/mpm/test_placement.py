@@ -24,7 +24,7 @@ from jaxphys.mpm.boundaries import (
 )
 from jaxphys.mpm.loop.adjoint import Plain
 from jaxphys.mpm.loop.chunks import cut, cuts, joined, numbers, orders
-from jaxphys.mpm.loop.placement import Placement, Slabs, cache_bytes, check_memory, suited
+from jaxphys.mpm.loop.placement import Placement, Slabs, check_memory, second_cache_bytes, suited
 from jaxphys.mpm.loop.rollout import rollout
 from jaxphys.mpm.materials.catalogue import MATERIALS, material_values
 from jaxphys.mpm.state import OK, STEP_TOO_LARGE, UNSTABLE_STEP, Config, Model, initial_state
@@ -340,8 +340,10 @@ def test_of_devices_of_unequal_memory_the_one_too_small_is_named():
 
 def test_few_particles_stay_on_one_device_and_many_are_cut():
     assert suited(100) == Placement(1, None)
-    second, last = cache_bytes()
-    assert 2**14 <= second <= last
-    large = suited(10 * last // 256)
+    second = second_cache_bytes()
+    assert 2**14 <= second <= 2**28
+    large = suited(10**6)
     assert large.devices == jax.device_count() and large.chunk * 256 == second
-    assert suited(10 * last // 256, devices=2).devices == 2
+    assert suited(10**6, devices=2).devices == 2
+    assert suited(10**6, devices=1) == Placement(1, large.chunk)
+    assert suited(4 * large.chunk, devices=1) == Placement(1, None)

@@ -18,6 +18,7 @@ PARTICLE_BYTES = 256  # of the state and of a pass's temporaries that a particle
 STATE_BYTES = 400  # of a state in float32 and of the next one, a particle
 LEAST = {"cpu": 4_000}  # particles on each device, below which meeting costs more than it saves
 LEAST_ELSEWHERE = 50_000
+WHOLE_CHUNKS = 4  # as many on one device are computed as a whole
 
 
 @dataclass(frozen=True)
@@ -134,8 +135,9 @@ def suited(particles: int, devices: int | None = None) -> Placement:
     """The placement that suits this machine.
 
     As many devices as have enough to do, and on a processor chunks that stay in a core's second
-    cache. One device alone computes arrays as a whole while they stay in the last cache: all cores
-    work on these, and one on a chunk.
+    cache. One device alone computes arrays as a whole while they are a few such chunks: all cores
+    work on these, and one on a chunk. (The last cache says nothing: a rented machine has a share of
+    it that nobody tells.)
 
     Args:
         particles: how many.
@@ -151,9 +153,9 @@ def suited(particles: int, devices: int | None = None) -> Placement:
     check_memory(jax.devices()[:used], particles)
     if platform != "cpu":
         return Placement(used)
-    second, last = cache_bytes()
-    fits = used == 1 and particles * PARTICLE_BYTES <= last
-    return Placement(used, None if fits else max(1024, second // PARTICLE_BYTES))
+    chunk = max(1024, second_cache_bytes() // PARTICLE_BYTES)
+    whole = used == 1 and particles <= WHOLE_CHUNKS * chunk
+    return Placement(used, None if whole else chunk)
 
 
 def check_memory(devices: list, particles: int) -> None:
@@ -172,17 +174,12 @@ def check_memory(devices: list, particles: int) -> None:
 
 
 @cache
-def cache_bytes() -> tuple[int, int]:
-    """Sizes of a core's second cache and of the last cache, in bytes; usual ones if unknown."""
-    second, last = 2**20, 2**25
+def second_cache_bytes() -> int:
+    """Size of a core's second cache in bytes; a usual one if unknown."""
     for folder in Path("/sys/devices/system/cpu/cpu0/cache").glob("index*"):
         try:
-            level = int((folder / "level").read_text())
-            size = int((folder / "size").read_text().strip().removesuffix("K")) * 1024
+            if int((folder / "level").read_text()) == 2:
+                return int((folder / "size").read_text().strip().removesuffix("K")) * 1024
         except (OSError, ValueError):
             continue  # told otherwise on this machine
-        if level == 2:
-            second = size
-        elif level == 3:
-            last = size
-    return second, max(second, last)
+    return 2**20

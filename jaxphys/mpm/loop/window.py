@@ -19,9 +19,10 @@ from jaxphys.mpm.loop.placement import Slabs
 from jaxphys.mpm.loop.status import least
 from jaxphys.mpm.state import Config, State
 
-# A node costs about a hundredth of a particle, and several devices send it to each other: where the
-# grid has so many for each particle, a part of it is worth another program.
-WORTH = 2
+# A node costs a fiftieth of a particle, on several devices that add it up a twentieth, and a window
+# is a program: seconds of compilation, as much as a film of some thousand steps takes to simulate.
+# It is worth that where it leaves out so many nodes for each particle, a quarter of a step.
+WORTH = 8
 GROWTH, MARGIN = 1.1, 2  # room for what a frame adds: a share of the span, and nodes
 MULTIPLE = 4  # few different windows, since each is compiled
 FEWEST_OF_ONE_MEMORY = 3  # devices that have slabs; of two, windows are 3% faster
@@ -102,11 +103,12 @@ def windowed(config: Config, state: State, *, slabs: bool | None = None) -> Conf
 
 def _window(config: Config, state: State) -> tuple[int, int, int] | None:
     nodes = math.prod(config.grid.shape)
-    if nodes < WORTH * config.particles:
+    worth = WORTH * config.particles
+    if nodes < worth:
         return None
     wanted = _with_room(config, _span(config, state.position))
     shape = np.minimum([_of_few(int(count)) for count in wanted], config.grid.shape)
-    if 2 * math.prod(shape.tolist()) > nodes:
+    if nodes - math.prod(shape.tolist()) < max(worth, nodes // 2):
         return None
     x, y, z = shape.tolist()
     return x, y, z
@@ -137,7 +139,7 @@ def _with_room(config: Config, span):
 
 def _of_few(count: int) -> int:
     """The next of 8, 12, 16, 24, 32, 48, ...: a body that swings would otherwise have many windows,
-    each of which is seconds of compilation, where a node is a hundredth of a particle.
+    each of which is seconds of compilation, where a node is a small part of a particle.
     """
     size = 8
     while size < count:
