@@ -13,6 +13,7 @@ anyway (`pipeline.frames`), with a share of the bounds.
 
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -25,7 +26,7 @@ from jaxphys.mpm.loop.rollout import Chunks, Passes, keep_good, prepared
 from jaxphys.mpm.loop.status import NO_FAILURE, least
 from jaxphys.mpm.loop.step_check import stiffening
 from jaxphys.mpm.state import OK, TOO_MANY_STEPS, UNSTABLE_STEP, Config, Model, State
-from jaxphys.mpm.stepping.adaptive import GROWTH, Adaptive, Steps, matter_bounds, next_steps
+from jaxphys.mpm.stepping.adaptive import GROWTH, LEAST, Adaptive, Steps, matter_bounds, next_steps
 from jaxphys.mpm.stepping.bounds import ADVECTION, GRADIENT, contact_bound
 from jaxphys.mpm.stepping.fixed import MOST_STEPS
 
@@ -58,11 +59,12 @@ def rollout_adaptively(
     dtype = state.position.dtype
     most = min(stepping.most_steps or MOST_STEPS, record or MOST_STEPS)
     duration, share = jnp.asarray(duration, dtype), jnp.asarray(share, dtype)
-    fixed = _lasting(passes, state.time, duration)
+    start = passes.cut()
+    fixed = _lasting(passes, start, state.time, duration)
 
     def block(carry):
         chunks, dt, left, taken, kept = carry
-        bound, limit, particle = _look(passes, chunks, stepping.safety, *fixed)
+        bound, limit, particle = _look(passes, chunks, stepping.safety, fixed)
         bound = jnp.where(chunks.first, share * bound, jnp.minimum(share * bound, GROWTH * dt))
         chunks = _told(chunks, bound, jnp.where(chunks.first, 0, dt), limit, particle)
         sound = chunks.status.code == OK
@@ -86,34 +88,54 @@ def rollout_adaptively(
         return (chunks.status.code == OK) & (left > 0)
 
     none = jnp.zeros((), jnp.int32)
-    start = passes.cut(), duration, duration, none, jnp.zeros(record, dtype)
-    chunks, dt, _, taken, kept = jax.lax.while_loop(goes_on, block, start)
+    first = start, duration, duration, none, jnp.zeros(record, dtype)
+    chunks, dt, _, taken, kept = jax.lax.while_loop(goes_on, block, first)
     return keep_good(state, passes.end(chunks, dt), taken), Steps(kept, taken)
 
 
-def _lasting(passes: Passes, begin: Array, duration: Array) -> tuple[Array, Array]:
-    """What does not change within a frame: the bound of contact [s], and the largest speed of a
-    boundary [m/s].
+class Lasting(NamedTuple):
+    """What holds for a frame, () each: the bound of contact [s], the largest speed of a boundary
+    [m/s], and the step [s] that matter bears which swings about its rest.
     """
+
+    contact: Array
+    boundaries: Array
+    swing: Array
+
+
+def _lasting(passes: Passes, chunks: Chunks, begin: Array, duration: Array) -> Lasting:
     config, model = passes.config, passes.model
     speeds = [boundary.fastest(begin, begin + duration) for boundary in model.boundaries]
     speed = jnp.max(jnp.stack([jnp.zeros(()), *speeds])).astype(model.mass.dtype)
-    return contact_bound(model, config.grid), speed
+    F, history = stiffening(config, chunks.particles)
+    rest = tuple(jnp.broadcast_to(jnp.eye(3, dtype=f.dtype)[..., None], f.shape) for f in F)
+    _, limit, _ = _of_matter(passes, rest, history, LEAST)
+    return Lasting(contact_bound(model, config.grid), speed, LEAST * limit)
 
 
-def _look(passes: Passes, chunks: Chunks, safety: float, contact: Array, boundaries: Array):
+def _look(passes: Passes, chunks: Chunks, safety: float, fixed: Lasting):
     """(step to take [s], limit of stability [s], the particle that decides of matter), () each."""
+    wanted, limit, particle = _of_matter(
+        passes, *stiffening(passes.config, chunks.particles), safety
+    )
+    # What is strained swings back, so that its stiffness now is not that of its swing: within the
+    # limit a step need not be shorter than fixed ones would be.
+    wanted = jnp.minimum(safety * limit, jnp.maximum(wanted, fixed.swing))
+    assert chunks.rates is not None  # what `Config.tells_rates` is for
+    speed, rate = fastest(chunks.rates, wanted.dtype)
+    advection = ADVECTION * passes.config.grid.spacing / jnp.maximum(speed, fixed.boundaries)
+    others = jnp.minimum(jnp.minimum(advection, GRADIENT / rate), fixed.contact)
+    return jnp.minimum(wanted, safety * others), jnp.minimum(limit, fixed.contact), particle
+
+
+def _of_matter(passes: Passes, F: tuple, history: tuple, safety: float):
+    """`_weakest` of all devices, for deformations and histories of each run."""
     config = passes.config
-    own = (passes.matter, passes.flags, *stiffening(config, chunks.particles), passes.names)
+    own = passes.matter, passes.flags, F, history, passes.names
     run = spread(
         config.placement, lambda _, own: (_weakest(config, safety, own), None), _least_of_devices
     )
-    (wanted, limit, particle), _ = run(None, own)
-    assert chunks.rates is not None  # what `Config.tells_rates` is for
-    speed, rate = fastest(chunks.rates, wanted.dtype)
-    advection = ADVECTION * config.grid.spacing / jnp.maximum(speed, boundaries)
-    others = jnp.minimum(jnp.minimum(advection, GRADIENT / rate), contact)
-    return jnp.minimum(wanted, safety * others), jnp.minimum(limit, contact), particle
+    return run(None, own)[0]
 
 
 def _weakest(config: Config, safety: float, own) -> tuple[Array, Array, Array]:

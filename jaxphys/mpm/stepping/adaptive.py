@@ -6,7 +6,9 @@ fall through the domain, no start that stands for the whole run.
 Of the sharp limit of stability a step takes `safety` where nothing is strained, and LEAST, the
 share that fixed steps live with, from a strain of half a hundredth on, since a particle that swings
 alone swings out further the nearer it is to the limit (`bounds.isolated_bound`). What it may come
-back to at the other side of its swing is left to that share, as it is with fixed steps.
+back to at the other side of its swing is left to that share, as it is with fixed steps; and where
+it is stiffer at this side than at rest, the share is of its limit at rest, as with these, as long
+as that is no more than `safety` of its limit now.
 """
 
 from dataclasses import dataclass, field

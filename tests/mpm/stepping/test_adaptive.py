@@ -20,7 +20,7 @@ from jaxphys.mpm.loop.frames import advance_frame, rollout_frames
 from jaxphys.mpm.loop.placement import Placement
 from jaxphys.mpm.loop.rollout import rollout, step
 from jaxphys.mpm.loop.status import SimulationError, check
-from jaxphys.mpm.materials.elasticity import HENCKY, lame
+from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, lame
 from jaxphys.mpm.state import (
     OK,
     TOO_MANY_STEPS,
@@ -39,6 +39,7 @@ ROOM = 24
 EVERY = 2
 STEPPING = Adaptive(every=EVERY)
 DURATION = 0.02
+EYE = jnp.eye(3)[..., None]
 adapted = jax.jit(partial(rollout_adaptively, stepping=STEPPING, record=ROOM), static_argnums=0)
 
 
@@ -57,6 +58,23 @@ def limits(config, model, state):
     (law, _, _) = config.segments[0]
     density = model.mass / model.volume
     return matter_bounds(law, model.parameters, state.deformation, density, 0.1, STEPPING.safety)
+
+
+def test_matter_that_is_strained_takes_the_step_of_its_swing():
+    """Not shorter than fixed steps would be, though it is stiffer now; no longer than `safety` of
+    its limit now.
+    """
+    config, model, state = stiff()
+    config = replace(config, segments=((FIXED_COROTATED, 0, 40),))  # stiffer when stretched
+    still = state._replace(velocity=0 * state.velocity, affine=0 * state.affine)
+    _, at_rest = limits(config, model, still._replace(deformation=still.deformation * 0 + EYE))
+    for stretch, decides in ((1.04, "rest"), (1.2, "now")):
+        strained = still._replace(deformation=still.deformation * 0 + stretch * EYE)
+        wanted, now = (float(x.min()) for x in limits(config, model, strained))
+        expected = {"rest": LEAST * float(at_rest.min()), "now": STEPPING.safety * now}[decides]
+        assert wanted < 0.98 * expected
+        _, steps = adapted(config, model, strained, duration=DURATION)
+        assert expected / 1.25 < float(steps.dt[0]) <= expected * (1 + 1e-6)
 
 
 @pytest.fixture(scope="module")
