@@ -31,10 +31,22 @@ def has_potential(boundary: Boundary) -> bool:
     return isinstance(boundary, Contact) and boundary.at_particles
 
 
-def lags(contact: Contact, loads: Parameters, position: Array, time: Array) -> tuple[Lag, ...]:
-    """One for each face that keeps slip; position: (3, N) [m] at the start of the step."""
-    found = []
+def faces(contact: Contact, position: Array, lost: Array | None, time: Array):
+    """The contact's faces as seen from `position` (3, N) [m] and what rounding left out of it,
+    `lost` (3, N) [m]: stiff matter at rest presses by less than a digit of its place.
+    """
     for face in contact.faces(position, time):
+        if lost is not None:
+            face = face._replace(distance=face.distance + jnp.sum(face.normal * lost, axis=0))
+        yield face
+
+
+def lags(
+    contact: Contact, loads: Parameters, position: Array, lost: Array | None, time: Array
+) -> tuple[Lag, ...]:
+    """One for each face that keeps slip; position, lost: (3, N) [m] at the start of the step."""
+    found = []
+    for face in faces(contact, position, lost, time):
         if not face.keeps_slip:
             continue
         radius = loads["particle_radius"]
@@ -53,6 +65,7 @@ def pushed(
     lags: tuple[Lag, ...],
     slip: Array | None,
     position: Array,
+    lost: Array | None,
     velocity: Array,
     time: Array,
     dt: Array,
@@ -62,13 +75,13 @@ def pushed(
     Args:
         lags: of the step's start.
         slip: rows of `State.slip` at the step's start.
-        position: (3, N) [m], that at the start and dt velocity.
+        position: (3, N) [m], that at the start and dt velocity; lost: what rounding left out.
         velocity: (3, N) [m/s]; time: [s] at the end; dt: [s].
     """
     radius, kept = loads["particle_radius"], 0
     energy, force = jnp.zeros_like(radius), jnp.zeros_like(position)
     with part("contact"):
-        for face in contact.faces(position, time):
+        for face in faces(contact, position, lost, time):
             pressed, _ = deflection(face, radius, None)
             energy, force = energy + pressing(face, radius), force + pressed * face.normal
             if face.keeps_slip and slip is not None:
@@ -107,15 +120,16 @@ def slipped(
     loads: Parameters,
     slip: Array,
     position: Array,
+    lost: Array | None,
     velocity: Array,
     time: Array,
     dt: Array,
 ) -> Array:
-    """Its rows of `State.slip` after a step: position (3, N) [m] and time [s] are those at the end,
-    velocity (3, N) [m/s] what moved it there.
+    """Its rows of `State.slip` after a step: position and lost (3, N) [m] and time [s] are those at
+    the end, velocity (3, N) [m/s] what moved it there.
     """
     rows: list[Array] = []
-    for face in contact.faces(position, time):
+    for face in faces(contact, position, lost, time):
         if face.keeps_slip:
             first = 3 * len(rows)
             moved = slip[first : first + 3] + dt * (velocity - face.velocity)

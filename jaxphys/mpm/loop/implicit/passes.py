@@ -18,7 +18,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from jaxphys.core import algebra, packed
+from jaxphys.core import algebra, compensated, packed
 from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
 from jaxphys.mpm.boundaries.potential import Lag, has_potential, lags, pushed, slipped
@@ -56,12 +56,14 @@ class Start(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """What stands still of some particles: their matter, themselves past their law, the norm of
-    their stiffness at rest (N,) [Pa], and what each boundary's contact found.
+    """What stands still of some particles: their matter, themselves past their law, what rounding
+    left out of their places (3, N) [m], the norm of their stiffness at rest (N,) [Pa], and what
+    each boundary's contact found.
     """
 
     matter: Matter
     particles: Particles
+    lost: Array | None
     stiffness: Array
     lags: tuple[tuple[Lag, ...], ...]
 
@@ -92,7 +94,8 @@ def passed(config: Config, body: Callable, sums: Any, least: Any, common: Any, o
     """
 
     def on_device(common, own):
-        carry, results = (sums, least), []
+        carry, common = common
+        results = []
         for (law, _, _), chunks in zip(config.runs, own, strict=True):
             step = jax.checkpoint(partial(body, law, common), prevent_cse=False)
             carry, result = jax.lax.scan(step, carry, chunks)
@@ -102,7 +105,9 @@ def passed(config: Config, body: Callable, sums: Any, least: Any, common: Any, o
     def joined(carry):
         return jax.lax.psum(carry[0], AXIS), jax.lax.pmin(carry[1], AXIS)
 
-    (sums, least), results = spread(config.placement, on_device, joined)(common, own)
+    (sums, least), results = spread(config.placement, on_device, joined)(
+        ((sums, least), common), own
+    )
     return sums, least, results
 
 
@@ -121,6 +126,7 @@ def begin(
     start: Start,
     matter: tuple[Matter, ...],
     particles: tuple[Particles, ...],
+    residuals: tuple[Residual | None, ...],
     flows: tuple[Flow, ...],
     stiffness: tuple[Array, ...],
 ) -> tuple[Array, Array, tuple[Rest, ...]]:
@@ -131,7 +137,8 @@ def begin(
 
     def body(law, start, carry, chunk):
         (rows, heavy), none = carry
-        matter, particles, flow, stiffness = chunk
+        matter, particles, residual, flow, stiffness = chunk
+        lost = None if residual is None else residual.position
         shared = start.shared
         if law.plastic or law.history:
             with part(f"law {law.name}"):
@@ -173,14 +180,14 @@ def begin(
             window, at, heavy, fixed[1] * fixed[2], nothing, jnp.zeros_like(flow.moment)
         )
         found = tuple(
-            lags(boundary, loads, place, shared.time) if has_potential(boundary) else ()
+            lags(boundary, loads, place, lost, shared.time) if has_potential(boundary) else ()
             for boundary, loads in zip(shared.boundaries, matter.loads, strict=True)
         )
-        return ((rows, heavy), none), Rest(matter, particles, stiffness, found)
+        return ((rows, heavy), none), Rest(matter, particles, lost, stiffness, found)
 
     dtype = particles[0].position.dtype
     empty = jnp.zeros((window.nodes, 4), dtype)
-    own = tuple(zip(matter, particles, flows, stiffness, strict=True))
+    own = tuple(zip(matter, particles, residuals, flows, stiffness, strict=True))
     (rows, heavy), _, rest = passed(config, body, (empty, empty), None, start, own)
     return rows, heavy[:, 3:], rest
 
@@ -211,8 +218,10 @@ def springs(grid: Grid, start: Start, rest: Rest, velocity: Array) -> tuple[Arra
         if slip is not None:
             slip = slip[first : first + boundary.rows]
             first += boundary.rows
-        place = particles.position + h * velocity
-        stored, force = pushed(boundary, loads, found, slip, place, velocity, shared.time + h, h)
+        place, lost = compensated.add(particles.position, rest.lost, h * velocity)
+        stored, force = pushed(
+            boundary, loads, found, slip, place, lost, velocity, shared.time + h, h
+        )
         energy, slope = energy + stored, slope - h * force
     if stages.acting(shared.boundaries, "on_particles"):
         given = [
@@ -385,7 +394,7 @@ def finish(
             shared.dt,
         )
         fault = jnp.minimum(fault, first_failure(code, numbers))
-        after = after._replace(slip=_slip(shared, matter, before, after, flow))
+        after = after._replace(slip=_slip(shared, matter, before, after, residual, flow))
         if end is not None:
             flow = Flow(*to_particles(window, start.origin, place, end))
             kept = stages.on_particles(
@@ -402,10 +411,16 @@ def finish(
 
 
 def _slip(
-    shared: Shared, matter: Matter, before: Particles, after: Particles, flow: Flow
+    shared: Shared,
+    matter: Matter,
+    before: Particles,
+    after: Particles,
+    residual: Residual | None,
+    flow: Flow,
 ) -> Array | None:
     if before.slip is None:
         return None
+    lost = None if residual is None else residual.position
     rows, first = [], 0
     for boundary, loads in zip(shared.boundaries, matter.loads, strict=True):
         if not boundary.rows:
@@ -413,6 +428,15 @@ def _slip(
         own = before.slip[first : first + boundary.rows]
         first += boundary.rows
         rows.append(
-            slipped(boundary, loads, own, after.position, flow.velocity, shared.later, shared.dt)
+            slipped(
+                boundary,
+                loads,
+                own,
+                after.position,
+                lost,
+                flow.velocity,
+                shared.later,
+                shared.dt,
+            )
         )
     return jnp.concatenate(rows)

@@ -39,7 +39,9 @@ HALVINGS = 12  # of a Newton step, before it counts as none
 LOOSEST = 0.5  # relative residual with which a linear system is left
 SHARE = 0.3  # of the tolerance that is enough for a linear system
 ROUNDING = 64  # of these may an energy rise by
-NOISE = 1.0  # of these is the least strain that a residual tells from rounding
+LOADS = 1e-2  # of what gravity gives, to which a residual must fall
+NOISE = 1.0  # of these is the least strain that a residual tells from rounding in any case
+FAINTEST = 0.01  # of these, below which none does
 
 
 class Effort(NamedTuple):
@@ -170,9 +172,9 @@ class Search(NamedTuple):
 def newton(config: Config, stepping: Implicit, problem: Problem) -> tuple[Array, Array, Effort]:
     """(velocities (M, 4), whether they solve the problem (), what it took).
 
-    A residual must be small beside stiffness and beside what it was: of stiff matter gravity itself
-    is a small one, and the softest modes of a body answer to it by far more than one node does. To
-    what rounding lets one see, one step is taken in any case.
+    A residual must be small beside stiffness, beside what it was and beside gravity: of stiff
+    matter gravity itself, and friction with it, is a small one, and so it is beside what a floor
+    gives that a step would pass. To what rounding lets one see, one step is taken in any case.
 
     Along a direction steps are halved until the energy is one and does not rise, or by no more than
     rounding while the residual falls.
@@ -181,6 +183,10 @@ def newton(config: Config, stepping: Implicit, problem: Problem) -> tuple[Array,
     eps = float(jnp.finfo(nodes.mass.dtype).eps)
     # Where rounding ends it, the reduction need not be reached.
     rounded = max(stepping.tolerance, NOISE * eps)
+    loads = characteristic(nodes, project(nodes, nodes.mass * (nodes.target - nodes.before)))
+    enough = jnp.where(
+        loads > 0, jnp.minimum(stepping.tolerance, LOADS * loads), stepping.tolerance
+    )
 
     def solved(s: Search):
         ends = (s.strain <= s.goal) & (s.taken > 0)
@@ -199,8 +205,8 @@ def newton(config: Config, stepping: Implicit, problem: Problem) -> tuple[Array,
         found = point(config, problem, s.at.velocities + s.share * s.direction)
         strain = characteristic(nodes, project(nodes, found.residual))
         good = better(found, strain, s)
-        least = jnp.minimum(stepping.tolerance, stepping.reduction * strain)
-        goal = jnp.where(s.taken < 0, jnp.maximum(least, NOISE * eps), s.goal)
+        least = jnp.minimum(enough, stepping.reduction * strain)
+        goal = jnp.where(s.taken < 0, jnp.maximum(least, FAINTEST * eps), s.goal)
         s = s._replace(
             at=jax.tree.map(partial(jnp.where, good), found, s.at),
             strain=jnp.where(good, strain, s.strain),

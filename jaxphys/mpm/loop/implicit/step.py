@@ -91,7 +91,13 @@ def attempt(
     start = Start(shared, origin, stage)
     with part("implicit step"):
         rows, heavy, rest = begin(
-            config, start, bodies.matter, moving.particles, moving.flows, bodies.stiffness
+            config,
+            start,
+            bodies.matter,
+            moving.particles,
+            moving.residuals,
+            moving.flows,
+            bodies.stiffness,
         )
         nodes = prepared(
             config,
