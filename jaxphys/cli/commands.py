@@ -10,6 +10,11 @@ from tyro.conf import Positional
 
 from jaxphys.core.errors import InputError
 
+Settings = Annotated[
+    tyro.conf.UseAppendAction[tuple[str, ...]],
+    tyro.conf.arg(name="set", metavar="NAME=VALUE"),
+]
+
 
 def generate(
     prompt: Positional[str | None] = None,
@@ -32,9 +37,14 @@ def generate(
     precision: Literal["bfloat16", "float32"] | None = None,
     attention_slice: int | None = None,
     save_splats: bool = False,
+    settings: Settings = (),
+    quiet: bool = False,
+    json: bool = False,
     overwrite: bool = False,
 ) -> int:
     """Make an object from a sentence and move it.
+
+    For example: jaxphys generate "a teddy bear" --material fracture --out outputs/bear
 
     Args:
         prompt: What the object is, for example "a strawberry". Comes from --config if left out.
@@ -60,22 +70,28 @@ def generate(
         attention_slice: Queries a published prior attends from at a time; fewer take less memory.
             Default: 1024.
         save_splats: Also write one .ply for each picture.
+        settings: Any field of the scene by its path in the file, or a parameter or field of the
+            first object for short, once or more: youngs_modulus=2e4, boundaries.0.friction=0.2.
+        quiet: Show no progress.
+        json: Print what was made, as JSON.
         overwrite: Replace the files of an earlier run of another request, and only these.
     """
+    from jaxphys.cli.made import tell
     from jaxphys.cli.scenes import files_read, scene_for, stepping_for
+    from jaxphys.cli.settings import with_settings
     from jaxphys.pipeline.generate import generate as run
 
     changes = {"seed": seed, "width": width, "height": height, "frames": frames}
     changes |= stepping_for(stepping)
-    scene = scene_for(config, material, changes)
-    run(
+    scene = with_settings(scene_for(config, material, changes), settings)
+    made = run(
         prompt,
         scene,
         out,
         save_splats=save_splats,
         overwrite=overwrite,
         inputs=files_read(config),
-        progress=True,
+        progress=not quiet,
         steps=steps,
         splats=splats,
         prior=prior,
@@ -85,6 +101,7 @@ def generate(
         precision=precision,
         attention_slice=attention_slice,
     )
+    tell(made, json)
     return 0
 
 
@@ -106,6 +123,8 @@ def image(
     overwrite: bool = False,
 ) -> int:
     """Paint one picture with Stable Diffusion, which shows that a checkpoint is whole.
+
+    For example: jaxphys image "a strawberry" --out strawberry.png
 
     Args:
         prompt: What to paint.
@@ -158,9 +177,14 @@ def animate(
     substep: float | None = None,
     unsafe_dt: bool = False,
     save_splats: bool = False,
+    settings: Settings = (),
+    quiet: bool = False,
+    json: bool = False,
     overwrite: bool = False,
 ) -> int:
     """Move an object as its material would.
+
+    For example: jaxphys animate ball.ply --set youngs_modulus=2e4 --out outputs/ball
 
     Args:
         source: Splats (.ply), a mesh (.obj, .glb), a directory made by generate, or the folder of a
@@ -178,9 +202,15 @@ def animate(
         substep: Time step [s], which makes steps equal. Default: as large as is safe.
         unsafe_dt: Take --substep even if it is beyond what is stable.
         save_splats: Also write one .ply for each picture.
+        settings: Any field of the scene by its path in the file, or a parameter or field of the
+            first object for short, once or more: youngs_modulus=2e4, boundaries.0.friction=0.2.
+        quiet: Show no progress.
+        json: Print what was made, as JSON.
         overwrite: Replace the files of an earlier run of another request, and only these.
     """
+    from jaxphys.cli.made import tell
     from jaxphys.cli.scenes import files_read, scene_for, stepping_for, with_source
+    from jaxphys.cli.settings import with_settings
     from jaxphys.pipeline.animate import animate as run
 
     changes = {"seed": seed, "width": width, "height": height, "frames": frames, "substep": substep}
@@ -188,16 +218,18 @@ def animate(
     scene = scene_for(config, material, changes, source)
     if unsafe_dt:
         scene = scene_for(None, None, {"unsafe_substep": True}, base=scene)
+    scene = with_settings(scene, settings)
     scene, beside = with_source(scene, source, config, splats)
-    run(
+    made = run(
         scene,
         out,
         beside=beside,
         save_splats=save_splats,
         overwrite=overwrite,
         inputs=files_read(config, source),
-        progress=True,
+        progress=not quiet,
     )
+    tell(made, json)
     return 0
 
 
@@ -211,6 +243,8 @@ def splat(
     overwrite: bool = False,
 ) -> int:
     """Turn a textured mesh into Gaussians.
+
+    For example: jaxphys splat mesh.glb --out mesh.ply
 
     Args:
         mesh: A .obj or .glb file.
@@ -241,6 +275,8 @@ def render(
     overwrite: bool = False,
 ) -> int:
     """Draw splats: one picture, or a turn around them.
+
+    For example: jaxphys render ball.ply --out ball.png
 
     Args:
         file: Splats.
@@ -281,22 +317,27 @@ def plan(
     *,
     material: str | None = None,
     object: Path | None = None,
+    settings: Settings = (),
     json: bool = False,
 ) -> int:
     """Tell what a scene needs, what is left out of its program and why, the time step and its
     bound.
 
+    For example: jaxphys plan --material sand --set domain.spacing=0.03
+
     Args:
         scene: A scene file, ours or PhysGaussian's, or a directory of an earlier run.
         material: Plan this material's own scene instead.
         object: The object to plan with; without it, a ball of the same size stands in.
+        settings: As for animate.
         json: Print JSON.
     """
     from jaxphys.cli.scenes import scene_for, with_source
+    from jaxphys.cli.settings import with_settings
     from jaxphys.pipeline.plan import as_text, make_plan
 
     config = scene / "config.json" if scene is not None and scene.is_dir() else scene
-    asked = scene_for(config, material, {})
+    asked = with_settings(scene_for(config, material, {}), settings)
     asked, beside = with_source(asked, object, config, None, required=False)
     print(as_text(make_plan(asked, beside), as_json=json))
     return 0
@@ -304,6 +345,8 @@ def plan(
 
 def materials(*, json: bool = False, markdown: bool = False) -> int:
     """List the materials, their parameters and defaults.
+
+    For example: jaxphys materials --json
 
     Args:
         json: Print JSON.
@@ -316,7 +359,10 @@ def materials(*, json: bool = False, markdown: bool = False) -> int:
 
 
 def doctor() -> int:
-    """Check the installed JAX against known answers; status 1 if one is wrong."""
+    """Check the installed JAX against known answers; status 1 if one is wrong.
+
+    For example: jaxphys doctor
+    """
     from jaxphys.cli.doctor import report
 
     text, healthy = report()

@@ -22,6 +22,8 @@ def evaluate(
     """Score the video of a run with CLIP and LAION's aesthetic heads; status 1 if a head is
     missing.
 
+    For example: jaxphys evaluate outputs/ball --json
+
     Args:
         directory: Made by generate or animate. Gets an evaluation.json.
         prompt: The sentence to compare with. Default: the one of the run.

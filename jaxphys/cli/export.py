@@ -18,6 +18,8 @@ def export(
 ) -> int:
     """Write the frames of a run, or a file of splats, for other programs.
 
+    For example: jaxphys export outputs/ball --to gltf --out outputs/ball-gltf
+
     Args:
         source: A directory made by animate or generate, or splats (.ply, .spz, .splat).
         to: ply and compressed-ply: files as viewers of 3D Gaussian splatting read them; gltf: .glb

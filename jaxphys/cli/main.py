@@ -9,7 +9,7 @@ import signal
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import tyro
@@ -26,6 +26,23 @@ from jaxphys.core.errors import InputError, one_line
 
 FAULT, REFUSED, INTERRUPTED, UNHEARD = 1, 2, 130, 141
 TRACEBACK = "--traceback"
+COMMANDS: dict[str, Callable[..., int]] = {
+    "generate": commands.generate,
+    "image": commands.image,
+    "animate": commands.animate,
+    "splat": commands.splat,
+    "render": commands.render,
+    "export": export,
+    "plan": commands.plan,
+    "fit": fit,
+    "materials": commands.materials,
+    "priors": priors,
+    "evaluate": evaluate,
+    "page": page,
+    "study": study,
+    "weights": weights.weights,
+    "doctor": commands.doctor,
+}
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -55,23 +72,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 def _dispatch(arguments: list[str]) -> int:
     status = tyro.extras.subcommand_cli_from_dict(
-        {
-            "generate": commands.generate,
-            "image": commands.image,
-            "animate": commands.animate,
-            "splat": commands.splat,
-            "render": commands.render,
-            "export": export,
-            "plan": commands.plan,
-            "fit": fit,
-            "materials": commands.materials,
-            "priors": priors,
-            "evaluate": evaluate,
-            "page": page,
-            "study": study,
-            "weights": weights.weights,
-            "doctor": commands.doctor,
-        },
+        COMMANDS,
         prog="jaxphys",
         description=(
             "Objects from text, meshes or splats that move as their material would. With"

@@ -18,6 +18,8 @@ def page(
 ) -> int:
     """Show runs on one page that needs nothing else: films, sentences, scores, objects in 3D.
 
+    For example: jaxphys page outputs/ball outputs/bear --out videos.html
+
     Args:
         directories: Made by generate or animate, in the order of the page. Frames that a run did
             not keep (--save-splats) are computed again.

@@ -7,6 +7,8 @@ import textwrap
 def priors(*, json: bool = False) -> int:
     """List the objects that the library makes and the bundled priors learn from, by family.
 
+    For example: jaxphys priors --json
+
     Args:
         json: Print JSON, with other names, parts, colours and options.
     """

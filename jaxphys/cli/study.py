@@ -16,6 +16,8 @@ def make(
 ) -> int:
     """Make a blinded, balanced page of a study, and the key to it.
 
+    For example: jaxphys study make study.json --out outputs/study
+
     Args:
         config: Items, clips of each method, questions; see docs/study.md.
         out: Folder for page/, to hand out, and key.json, to keep.
@@ -37,6 +39,8 @@ def analyse(
     json: bool = False,
 ) -> int:
     """Mean opinion scores and Bradley-Terry strengths of a study, with intervals by raters.
+
+    For example: jaxphys study analyse outputs/study ANSWERS.json
 
     Args:
         folder: Made by `study make`.

@@ -11,6 +11,8 @@ Name = Annotated[Positional[str], tyro.conf.arg(metavar="NAME")]
 def list_all(*, json: bool = False) -> int:
     """List the networks that can be used, their licences, and which are on this computer.
 
+    For example: jaxphys weights list
+
     Args:
         json: Print JSON.
     """
@@ -22,6 +24,8 @@ def list_all(*, json: bool = False) -> int:
 
 def path(name: Name, /) -> int:
     """Print where the files of a network are; fetches nothing.
+
+    For example: jaxphys weights path smollm2
 
     Args:
         name: As in the list.
@@ -35,6 +39,8 @@ def path(name: Name, /) -> int:
 
 def fetch(name: Name, /, *, half: bool = False) -> int:
     """Fetch what is missing of a network over the network, and print where it is.
+
+    For example: jaxphys weights fetch smollm2
 
     Args:
         name: As in the list.
@@ -50,6 +56,8 @@ def fetch(name: Name, /, *, half: bool = False) -> int:
 def verify(name: Name, /) -> int:
     """Compare the files of a network with what is known of the published ones; status 1 if one is
     missing or wrong.
+
+    For example: jaxphys weights verify point_prior
 
     Args:
         name: As in the list.
