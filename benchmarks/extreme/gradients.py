@@ -18,9 +18,12 @@ from jaxphys.core.splats import Splats
 from jaxphys.mpm.loop.rollout import rollout
 from jaxphys.mpm.state import OK
 from jaxphys.mpm.stepping.bounds import largest_stable_dt
+from jaxphys.render import Settings, render
 
 METHODS = ("gradient float64",)
 H, STEPS = 1e-6, 4
+# Without the cut-offs, at which pictures jump.
+SMOOTH = Settings(alpha_min=1e-12, transmittance_min=0.0)
 WEIGHTS = np.random.default_rng(7)
 PULL = WEIGHTS.normal(size=(COUNT, 3)), WEIGHTS.normal(size=(COUNT, 3, 3))
 PAINT = WEIGHTS.normal(size=(pictures.SIZE, pictures.SIZE, 3))
@@ -33,7 +36,10 @@ def _motion(config, free, model, state, dt):
 
     def loss(free):
         E, x, v, F = free
-        values = {**model.parameters, "youngs_modulus": model.parameters["youngs_modulus"] * (1 + E)}
+        values = {
+            **model.parameters,
+            "youngs_modulus": model.parameters["youngs_modulus"] * (1 + E),
+        }
         start = state._replace(
             position=state.position + SPACING * x,
             velocity=state.velocity + 0.01 * speed * v,
@@ -60,7 +66,8 @@ def _drawn(free, splats, camera):
             splats.opacities * (1 + o),
             splats.colours + k,
         )
-        return jnp.sum(pictures._picture(moved, camera).colour * PAINT)
+        image = render(moved, camera, settings=SMOOTH, capacity=pictures.ROOM)
+        return jnp.sum(image.colour * PAINT)
 
     return jax.value_and_grad(loss)(free)
 
@@ -130,7 +137,11 @@ def cases() -> list[Case]:
     by = "central differences"
     found = [
         Case(
-            f"gradient, {name}", "gradient", partial(of_motion, build, 1e-5), METHODS, by,
+            f"gradient, {name}",
+            "gradient",
+            partial(of_motion, build, 1e-5),
+            METHODS,
+            by,
             quick=name in ("E 1e2", "E 1e11", "nu 0.4999", "flat to 5 %"),
         )
         for name, build in _motions().items()

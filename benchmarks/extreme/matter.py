@@ -26,16 +26,24 @@ from jaxphys.mpm.stepping import Adaptive, Implicit
 from jaxphys.mpm.stepping.bounds import largest_stable_dt
 
 COUNT, SPACING, NODES = 64, 0.1, 16
+MIDDLE = np.array([0.75, 0.75, 0.75])
 MOST_STEPS = 1024
 ADAPTIVE = ("adaptive float32", "adaptive float64")
 FIXED = ("fixed float32", "fixed float64")
 IMPLICIT = ("implicit float64",)
 NAMES = {
     getattr(codes, name): name
-    for name in (
-        "NOT_FINITE LEFT_GRID STEP_TOO_LARGE LEFT_WINDOW INVERTED COLLAPSED UNSTABLE_STEP "
-        "TOO_MANY_STEPS NOT_CONVERGED"
-    ).split()
+    for name in [
+        "NOT_FINITE",
+        "LEFT_GRID",
+        "STEP_TOO_LARGE",
+        "LEFT_WINDOW",
+        "INVERTED",
+        "COLLAPSED",
+        "UNSTABLE_STEP",
+        "TOO_MANY_STEPS",
+        "NOT_CONVERGED",
+    ]
 }
 
 
@@ -141,16 +149,12 @@ def scene(
 @partial(jax.jit, static_argnums=0)
 def _adaptively(config, model, state, duration):
     stepping = Adaptive(most_steps=MOST_STEPS)
-    return rollout_adaptively(
-        config, model, state, stepping, duration=duration, record=MOST_STEPS
-    )
+    return rollout_adaptively(config, model, state, stepping, duration=duration, record=MOST_STEPS)
 
 
 @partial(jax.jit, static_argnums=0)
 def _implicitly(config, model, state, duration):
-    return implicit_rollout(
-        config, model, state, time=duration, stepping=Implicit(most_steps=64)
-    )
+    return implicit_rollout(config, model, state, time=duration, stepping=Implicit(most_steps=64))
 
 
 def stepped(made: Scene, method: str) -> tuple[Run, float | None]:

@@ -111,6 +111,7 @@ def turned(variances) -> np.ndarray:
 def scenes() -> dict:
     """name -> (values, what they stand for or None, field of view, distance, quick)."""
     eye = np.array([0.0, -0.25 / math.tan(math.radians(20)), 0.0])
+    ahead, aside = np.array([0.0, 1.0, 0.0]), np.array([0.1, 0.0, 0.0])
     with_ = partial(_with, values())
     without = with_(0, opacities=0.0)
     near = SETTINGS.near
@@ -133,15 +134,16 @@ def scenes() -> dict:
         "place infinite": (with_(0, means=np.full(3, np.inf)), without),
         "colour not a number": (with_(0, colours=np.full(3, np.nan)), without),
         "at the camera": (with_(0, means=eye), without),
-        "in the plane of the camera": (with_(0, means=eye + [0.1, 0, 0]), without),
+        "in the plane of the camera": (with_(0, means=eye + aside), without),
         "behind the camera": (with_(0, means=2 * eye), without),
-        "just short of the near plane": (with_(0, means=eye + [0, 0.999 * near, 0]), without),
+        "just short of the near plane": (with_(0, means=eye + 0.999 * near * ahead), without),
         "just beyond the near plane": (
-            with_(0, means=eye + [0, 1.001 * near, 0], covariances=1e-6 * np.eye(3)),
+            with_(0, means=eye + 1.001 * near * ahead, covariances=1e-6 * np.eye(3)),
             None,
         ),
         "the camera within a splat": (
-            with_(0, means=eye + [0, 0.02, 0], covariances=np.eye(3)), None,
+            with_(0, means=eye + 0.02 * ahead, covariances=np.eye(3)),
+            None,
         ),
         "1,000 km away": (with_(0, means=[0, 1e6, 0], covariances=1e10 * np.eye(3)), None),
         "beyond the far plane": (with_(0, means=[0, 2e10, 0]), without),
@@ -155,8 +157,8 @@ def scenes() -> dict:
     found = {name: (*both, 40.0, None) for name, both in found.items()}
     for field in (1.0, 90.0, 170.0):
         found[f"a field of {field:g} degrees"] = (values(), None, field, None)
-    aside = with_(0, means=[0.9, -0.15, 0.0])
-    found["far aside, a field of 170 degrees"] = (aside, None, 170.0, 0.25)
+    beside = with_(0, means=[0.9, -0.15, 0.0])
+    found["far aside, a field of 170 degrees"] = (beside, None, 170.0, 0.25)
     return found
 
 
@@ -202,15 +204,20 @@ def cases() -> list[Case]:
     for name, (given, expected, field, distance) in scenes().items():
         task = partial(run, given, field, distance, expected, SHARP.get(name, 2e-4))
         found.append(Case(name, "picture", task, METHODS, "every splat at every pixel", quick=True))
-    # What is 3e6 times as long as thick: float32 covariances cannot say how thick (eps 1e11 > 0.01),
+    # What is 3e6 times as long as thick: float32 covariances cannot say how thick (eps 1e11 > 0.01)
     # and nothing tells. The one named exception, docs/limitations.md.
     sheet = values(covariances=turned([0.0, 0.01, 1e11]))
     for method, outcome in zip(METHODS, (WRONG, RIGHT), strict=True):
         task = partial(run, sheet, 40.0, None, None, 0.5)
         found.append(
             Case(
-                "300 km wide and flat", "picture", task, (method,), "every splat at every pixel",
-                frozenset({outcome}), quick=True,
+                "300 km wide and flat",
+                "picture",
+                task,
+                (method,),
+                "every splat at every pixel",
+                frozenset({outcome}),
+                quick=True,
             )
         )
     for count in (1_000, 100_000, 1_000_000):
@@ -218,17 +225,24 @@ def cases() -> list[Case]:
             about = "seen" if opacity >= SETTINGS.alpha_min else "below the cut-off"
             found.append(
                 Case(
-                    f"{count} splats in one tile, {about}", "picture",
-                    partial(crowded, count, opacity), METHODS[:1], "closed form",
+                    f"{count} splats in one tile, {about}",
+                    "picture",
+                    partial(crowded, count, opacity),
+                    METHODS[:1],
+                    "closed form",
                     quick=count == 1_000,
                 )
             )
     brighter = values(opacities=1.01 * OPACITIES)
     found.append(
         Case(
-            "control: a picture one per cent too opaque", "control",
-            partial(run, brighter, 40.0, None, values(), 2e-4), METHODS,
-            "every splat at every pixel", frozenset({WRONG}), quick=True,
+            "control: a picture one per cent too opaque",
+            "control",
+            partial(run, brighter, 40.0, None, values(), 2e-4),
+            METHODS,
+            "every splat at every pixel",
+            frozenset({WRONG}),
+            quick=True,
         )
     )
     return found

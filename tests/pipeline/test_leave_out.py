@@ -1,4 +1,4 @@
-"""What a scene does not list is not in its program: one test a part, by the primitives of the jaxpr.
+"""What a scene does not list is not in its program: one test a part, by its primitives.
 
 Each part is asked for once, as a control: then its primitives are there.
 """
