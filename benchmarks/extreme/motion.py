@@ -454,7 +454,7 @@ def long_flights():
         build = partial(
             scene,
             position=cube(),
-            velocity=(0.004, -0.003, 0.002),
+            velocity=np.array([40, -30, 20]) / steps,
             fixed=0.5,
             bounds=steps / 2,
             E=1e5,

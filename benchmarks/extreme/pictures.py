@@ -19,7 +19,7 @@ SIZE, ROOM = 32, 4096
 SETTINGS = Settings()
 METHODS = ("picture float32", "picture float64")
 BEHIND = np.array([0.1, 0.2, 0.3])  # background
-PLACES = np.array([[0.0, 0, 0], [0.11, 0.1, 0.07], [-0.13, 0, 0.09], [0.07, -0.1, -0.12]])
+PLACES = np.array([[0.0, 0, 0], [0.11, 0.1, 0.07], [-0.13, 0.03, 0.09], [0.07, -0.1, -0.12]])
 COLOURS = np.array([[1.0, 0.1, 0.2], [0.2, 0.9, 0.1], [0.1, 0.3, 0.8], [0.7, 0.7, 0.1]])
 ROUND = np.broadcast_to(0.0025 * np.eye(3), (4, 3, 3))
 # Most by which float32 may be off, where it is not 2e-4: one axis 1e4 times as long as another.
