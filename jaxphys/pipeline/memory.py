@@ -17,7 +17,7 @@ from jaxphys.pipeline.film import drawn_at_once
 from jaxphys.scene.build import Built
 from jaxphys.scene.scene import Scene
 
-PROGRAM = 600 * 2**20  # interpreter, libraries, and what the compiler needs
+PROGRAM = 800 * 2**20  # interpreter, libraries, and what the compiler needs
 STATES = 4  # copies of a state and its parameters: whole, in chunks, of two frames
 NODES = 3  # copies of the rows of the grid: before and after a pass, and their velocities
 SPLAT = 1500  # bytes a splat while it is drawn: deformed, projected, and its pairs sorted
