@@ -69,13 +69,14 @@ def figure(lines: list[dict], path: Path) -> None:
     for axis, name in zip(axes, names, strict=True):
         for dtype in ("float32", "float64"):
             own = [line for line in lines if line["dtype"] == dtype]
-            steps, values = ([line[key] for line in own] for key in ("step", name))
+            steps = [line["step"] / 1000 for line in own]
+            values = [line[name] for line in own]
             if name == "energy":
                 axis.plot(steps, values, label=dtype)
             else:
                 axis.semilogy(steps[1:], np.maximum(values[1:], 1e-18), label=dtype)
         axis.set_title(f"{name}, change" if name != "energy" else "energy, of the first")
-        axis.set_xlabel("steps")
+        axis.set_xlabel("thousand steps")
     axes[2].set_ylim(0, 1.05)
     axes[0].legend()
     figure.savefig(path, metadata={"Date": None})
