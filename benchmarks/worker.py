@@ -8,13 +8,21 @@ import statistics
 import time
 from importlib import metadata
 
-SUITES = ("mpm", "mpm-grad", "scaling", "render", "drawing", "headline", "order", "implicit")
+SUITES = (
+    *("mpm", "mpm-grad", "scaling", "render", "drawing", "headline", "order", "implicit"),
+    *("extreme", "leave-out"),
+)
 MINIMUM_CALLS = 3
 
 
+def suite_module(suite: str):
+    """The module that bears a suite's name."""
+    return importlib.import_module(f"benchmarks.{suite.replace('-', '_')}")
+
+
 def suite_cases(suite: str, quick: bool) -> list:
-    """The cases of a suite: `cases(quick)` of the module that bears its name."""
-    return importlib.import_module(f"benchmarks.{suite.replace('-', '_')}").cases(quick)
+    """The cases of a suite: `cases(quick)` of its module."""
+    return suite_module(suite).cases(quick)
 
 
 def versions() -> dict[str, str]:

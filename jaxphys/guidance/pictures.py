@@ -29,7 +29,7 @@ def neighbour_sizes(points: np.ndarray, scale: float, largest: float) -> np.ndar
 
 def picture_settings(resolution: int) -> Settings:
     """Small tiles for small pictures."""
-    return Settings(tile_size=8 if resolution <= 128 else 16)
+    return Settings(tile_size=8 if resolution <= 128 else 16, depth=False)
 
 
 def view_camera(

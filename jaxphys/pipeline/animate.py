@@ -17,6 +17,7 @@ from jaxphys.gaussians.ply import write_ply
 from jaxphys.mpm.loop.status import SimulationError
 from jaxphys.pipeline.draw import deformed_gaussians
 from jaxphys.pipeline.film import Artist, film
+from jaxphys.pipeline.memory import at_least, expected, require_room, room
 from jaxphys.pipeline.output import Timing, write_lines
 from jaxphys.pipeline.record import Record, recorded
 from jaxphys.pipeline.resume import FOLDER, MotionCheckpoint
@@ -82,7 +83,8 @@ def animate(
         watch: called as watch(stage, frame) after each frame; may raise KeyboardInterrupt.
 
     Raises:
-        InputError: the scene or an object cannot be used, or `out` cannot (see `run_folder`).
+        InputError: the scene or an object cannot be used, they do not fit into memory, or `out`
+        cannot be written to (see `run_folder`).
         SimulationError: the motion failed; `last_good.ply` and `last_good.png` show the frame
         before.
         KeyboardInterrupt: what is done is saved.
@@ -97,6 +99,7 @@ def animate(
                 for i, thing in enumerate(scene.objects)
             )
             inputs = (*inputs, *source_files(scene, beside))
+    require_room(at_least(scene, sum(one.count for one in objects)), room())
     meshes = [mesh_file(scene, i) for i in mesh_obstacles(scene)]
     inputs = (*inputs, *meshes)
     written = _with_written_sources(scene)
@@ -145,6 +148,7 @@ def animate_in(
     """
     with timing.stage("build"):
         simulation, look = built = build(scene, *objects)
+    require_room(expected(scene, built), room())
     scene = _write_inputs(folder, scene, objects)
     identity = fingerprint(_text(scene), (simulation.model, simulation.state))
     checkpoint = MotionCheckpoint(folder.file(FOLDER), identity)

@@ -19,7 +19,7 @@ from jaxphys.render.renderer import Image, render
 from jaxphys.render.settings import Settings
 from jaxphys.scene.look import Look
 
-SETTINGS = Settings()
+SETTINGS = Settings(depth=False)  # films and fits look at colours
 
 
 def frame_splats(look: Look, frame: Frame, eye: Array) -> Splats:

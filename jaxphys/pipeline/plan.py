@@ -31,6 +31,7 @@ from jaxphys.mpm.stepping import Adaptive, Implicit
 from jaxphys.mpm.stepping.bounds import largest_stable_dt
 from jaxphys.mpm.stepping.choice import which_stepping
 from jaxphys.pipeline.film import drawn_at_once, picture, surroundings_of
+from jaxphys.pipeline.memory import expected, room
 from jaxphys.render.camera import orbit
 from jaxphys.scene.build import Built, build
 from jaxphys.scene.obstacles import located
@@ -109,7 +110,7 @@ class Plan:
         substep: time step [s], of fixed steps; `bounds` [s] and `reason`: what limits it.
         steps_per_frame, frames, steps: counts, of fixed steps; those that adapt are not known
             before they are taken.
-        memory: bytes by what they hold.
+        memory: bytes at the peak, by what they hold; room: bytes that there are, if known.
         seconds: estimate by stage, on two CPU cores.
     """
 
@@ -133,6 +134,7 @@ class Plan:
     frames: int
     steps: int
     memory: dict[str, int]
+    room: int | None
     seconds: dict[str, float]
 
 
@@ -234,8 +236,7 @@ def describe(scene: Scene, built: Built) -> Plan:
     reason = bounds.reason if scene.substep is None else "the scene's own substep"
     slabs = slabs_for(simulation.stepping)
     first = windowed(simulation.config, simulation.state, slabs=slabs)
-    placement, transfer = simulation.config.placement, simulation.config.transfer
-    row, stencil = 4 * transfer.columns, transfer.spline.width**3
+    placement = simulation.config.placement
     chunk = max(into.size for into in cuts(simulation.config.runs, placement))
     particles, drawn = simulation.config.particles, look.gaussians.count
     nodes = int(np.prod(simulation.config.grid.shape))
@@ -245,8 +246,6 @@ def describe(scene: Scene, built: Built) -> Plan:
     # What the scene has nothing of sets no bound.
     limits = {k: float(v) for k, v in bounds._asdict().items() if np.isfinite(v)}
     pixels = scene.width * scene.height
-    state = sum(leaf.nbytes for leaf in jax.tree.leaves(simulation.state))
-    model = sum(leaf.nbytes for leaf in jax.tree.leaves(simulation.model))
     return Plan(
         included=included,
         left_out=left_out,
@@ -267,13 +266,8 @@ def describe(scene: Scene, built: Built) -> Plan:
         steps_per_frame=a_frame,
         frames=scene.frames,
         steps=steps,
-        memory={
-            "state and parameters": state + model,
-            "grid": row * nodes,
-            "transfers": stencil * row * placement.devices * chunk,
-            "motion": 48 * drawn * scene.frames,
-            "pictures": 32 * pixels * drawn_at_once(scene.frames),
-        },
+        memory=expected(scene, built),
+        room=room(),
         seconds={
             "compile": COMPILE_SECONDS,
             "simulate": passes
@@ -327,6 +321,17 @@ def shared(plan: Plan) -> str:
     return f"; each has {plan.slab} planes of the window and tells its neighbours, {sent}"
 
 
+def memory_text(plan: Plan) -> str:
+    """What the peak is made of, and whether there is that much."""
+    total = sum(plan.memory.values())
+    parts = ", ".join(f"{name} {size / 2**20:.1f}" for name, size in plan.memory.items())
+    line = f"memory at the peak: {total / 2**20:.0f} MiB ({parts})"
+    if plan.room is None:
+        return line
+    fits = "" if total <= plan.room else ": it does not fit"
+    return f"{line}, of {plan.room / 2**20:.0f} MiB{fits}"
+
+
 def as_text(plan: Plan, as_json: bool = False) -> str:
     """The plan for people, or as JSON."""
     if as_json:
@@ -348,7 +353,7 @@ def as_text(plan: Plan, as_json: bool = False) -> str:
         f"time step: {plan.substep:.3e} s, limited by {plan.reason}",
         *(f"  bound {name}: {value:.3e} s" for name, value in plan.bounds.items()),
         f"steps: {plan.steps_per_frame} a frame, {plan.frames} frames, {plan.steps} in all",
-        "memory: " + ", ".join(f"{k} {v / 2**20:.1f} MiB" for k, v in plan.memory.items()),
+        memory_text(plan),
         "time on two cores, roughly: "
         + ", ".join(f"{name} {seconds:.0f} s" for name, seconds in plan.seconds.items()),
     ]

@@ -26,14 +26,14 @@ class Image(NamedTuple):
     Attributes:
         colour: over the background, shape (H, W, C).
         alpha: how much of the background is hidden, in [0, 1], shape (H, W).
-        depth: sum of w_i z_i [m], shape (H, W); see `mean_depth`.
+        depth: sum of w_i z_i [m], shape (H, W); see `mean_depth`. None without `Settings.depth`.
         required: pairs of tile and splat that this picture needs, int32 ().
         overflow: whether that was more than the capacity, so that far splats are missing, bool ().
     """
 
     colour: Array
     alpha: Array
-    depth: Array
+    depth: Array | None
     required: Array
     overflow: Array
 
@@ -114,7 +114,12 @@ def next_capacity(required: int) -> int:
 
 
 def mean_depth(image: Image) -> Array:
-    """Depth averaged over what is seen, sum w z / sum w [m], shape (H, W); 0 where nothing is."""
+    """Depth averaged over what is seen, sum w z / sum w [m], shape (H, W); 0 where nothing is.
+
+    Raises `InputError` if the picture was drawn without depth.
+    """
+    if image.depth is None:
+        raise InputError("mean_depth: the picture has no depth; give Settings(depth=True)")
     seen = image.alpha > 1e-6
     return jnp.where(seen, image.depth / jnp.where(seen, image.alpha, 1), 0)
 
@@ -126,17 +131,15 @@ def _render(splats, camera, background, settings, capacity) -> Image:
     if splats.means.shape[0] == 0:
         colour = jnp.broadcast_to(background, (height, width, splats.colours.shape[1]))
         empty = jnp.zeros((height, width), dtype)
-        return Image(colour, empty, empty, jnp.int32(0), jnp.bool_(False))
+        depth = empty if settings.depth else None
+        return Image(colour, empty, depth, jnp.int32(0), jnp.bool_(False))
 
     grid = make_grid(width, height, settings)
     projected = project(splats, camera, settings)
     valid = projected.valid
+    depths = [jnp.where(valid, projected.depths, 0)[None]] if settings.depth else []
     features = jnp.concatenate(
-        [
-            jnp.where(valid, splats.colours.T, 0),
-            jnp.where(valid, projected.depths, 0)[None],
-            jnp.ones((1, valid.shape[0]), dtype),
-        ]
+        [jnp.where(valid, splats.colours.T, 0), *depths, jnp.ones((1, valid.shape[0]), dtype)]
     )
     own_capacity = -(-capacity // grid.share)
 
@@ -153,7 +156,9 @@ def _render(splats, camera, background, settings, capacity) -> Image:
     picture = tiles.reshape(grid.share, grid.own_rows, grid.columns, -1, size, size)
     picture = picture.transpose(1, 0, 4, 2, 5, 3)
     picture = picture.reshape(-1, grid.columns * size, picture.shape[-1])[:height, :width]
-    colour, depth, alpha = picture[..., :-2], picture[..., -2], picture[..., -1]
+    channels = splats.colours.shape[1]
+    colour, alpha = picture[..., :channels], picture[..., -1]
+    depth = picture[..., channels] if settings.depth else None
     colour = colour + (1 - alpha)[..., None] * background
     return Image(colour, alpha, depth, required, required > grid.share * own_capacity)
 

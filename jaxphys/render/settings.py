@@ -33,6 +33,7 @@ class Settings:
             half field of view about the optical axis (Kerbl et al. 2023), "none".
         gradient_through_clamp: pass the gradient of alpha through the clamp at `alpha_max`, as
             Kerbl et al. 2023 do; the true derivative there is zero, which is the default.
+        depth: whether `Image.depth` is worked out; without it a number less is blended a splat.
         chunk_size, group_size: how the blending loop is cut up: so many splats of a tile at a time,
             for so many tiles at a time. `group_size` None takes what suits the tile. Speed only.
         devices: so many, the first of `jax.devices()`, share the rows of tiles of one picture. For
@@ -51,6 +52,7 @@ class Settings:
     extent: str = "alpha"
     jacobian_clamp: str = "principal"
     gradient_through_clamp: bool = False
+    depth: bool = True
     chunk_size: int = 8
     group_size: int | None = None
     devices: int = 1

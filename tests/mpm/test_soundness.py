@@ -172,6 +172,17 @@ def test_what_is_inside_out_or_flat_is_never_sound(name):
     assert int(run(model, state, dt=1e-6).status.code) == OK
 
 
+def test_what_is_inside_out_is_told_as_such_where_its_stress_is_no_number():
+    """Neo-Hookean stress has the logarithm of det F: a run would say NOT_FINITE after a step."""
+    config, model, state = block(count=27, check_step=False)
+    run = jax.jit(partial(rollout, config, steps=3))
+    assert int(run(model, state, dt=1e-6).status.code) == OK
+    state = state._replace(deformation=jnp.moveaxis(jnp.asarray(ONE), 0, -1))
+    end = run(model, state, dt=1e-6)
+    assert [int(x) for x in end.status[:3]] == [INVERTED, 0, 13]
+    np.testing.assert_array_equal(end.deformation, state.deformation)
+
+
 def test_the_initial_state_refuses_what_is_inside_out():
     config, _, state = material_block("jelly", MIRROR)
     with pytest.raises(InputError, match=r"deformation\[13\] has determinant -0.5"):

@@ -23,7 +23,7 @@ from jaxphys.mpm.loop.pass_derivative import one_pass
 from jaxphys.mpm.loop.placement import gathered
 from jaxphys.mpm.loop.rates import slowest
 from jaxphys.mpm.loop.replay import check_sequence, replayed
-from jaxphys.mpm.loop.status import MOST_PARTICLES, after_step
+from jaxphys.mpm.loop.status import MOST_PARTICLES, after_step, of_start
 from jaxphys.mpm.loop.step_check import checked, stiffening
 from jaxphys.mpm.loop.window import extent, followed, hulls, orders_for
 from jaxphys.mpm.state import OK, Config, Model, Residual, RigidBody, State, Status
@@ -136,7 +136,9 @@ class Passes(NamedTuple):
 
     def cut(self) -> Chunks:
         """The state in chunks, before the first pass."""
-        return cut_state(self.config, self.state, self.segments, self.order)
+        chunks = cut_state(self.config, self.state, self.segments, self.order)
+        F = jax.lax.stop_gradient(self.state.deformation)
+        return chunks._replace(status=of_start(chunks.status, F))
 
     def checked(self, chunks: Chunks, dt: Array) -> Chunks:
         """With the status of a state that is too stiff for `dt` [s]."""

@@ -162,3 +162,12 @@ def after_step(status: Status, first: Array) -> Status:
         particle=jnp.where(fails, first // CODES, status.particle),
         taken=status.taken + 1,
     )
+
+
+def of_start(status: Status, F: Array) -> Status:
+    """The status before a step from F (3, 3, N): what is inside out is told as such, whatever its
+    law makes of it.
+    """
+    code = jnp.where(algebra.determinant(F) <= 0, INVERTED, OK)
+    first = first_failure(code, jnp.arange(F.shape[-1], dtype=jnp.int32))
+    return after_step(status, first)._replace(taken=status.taken)

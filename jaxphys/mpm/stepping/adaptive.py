@@ -23,6 +23,8 @@ from jaxphys.mpm.stepping import bounds, fixed
 from jaxphys.mpm.transfer.schemes import Transfer
 
 LEAST = fixed.SAFETY * bounds.SAFETY
+# What is let go when strained by half or more gathers speed until the next look.
+RELEASE = 0.8
 GROWTH = 1.5  # from one look to the next; a step shrinks at once
 
 
@@ -65,9 +67,11 @@ def matter_bounds(
     the one beyond which it is unstable as it is now deformed.
     """
     limit = bounds.hard_limit(law, parameters, F, density, spacing, transfer)
-    swing = jnp.max((bounds.principal_stretches(F) - 1) ** 2, axis=0) / bounds.SWING**2
+    s = bounds.principal_stretches(F)
+    swing = jnp.max((s - 1) ** 2, axis=0) / bounds.SWING**2
     share = jnp.maximum(LEAST / bounds.SAFETY, 1 / jnp.sqrt(1 + swing))
-    return safety * share * limit, limit
+    released = bounds.release_bound(law, parameters, F, s, density, spacing, RELEASE, transfer)
+    return safety * jnp.minimum(share * limit, released), limit
 
 
 def next_steps(left: Array, bound: Array, most: int) -> tuple[Array, Array]:

@@ -108,6 +108,10 @@ def _eigenvalues(diagonal: Array, beside: Array) -> Array:
     In closed form (Smith 1961): short, and off by the square root of eps of their spread where two
     of them meet, which is enough for a bound. Not for differentiation.
     """
+    # Squares of the largest moduli leave float32.
+    largest = jnp.maximum(jnp.max(jnp.abs(diagonal), axis=0), jnp.max(jnp.abs(beside), axis=0))
+    largest = jnp.where(largest > 0, largest, 1)
+    diagonal, beside = diagonal / largest, beside / largest
     mean = jnp.mean(diagonal, axis=0)
     a, b = diagonal - mean, beside
     size = jnp.sqrt((jnp.sum(a**2, axis=0) + 2 * jnp.sum(b**2, axis=0)) / 6)
@@ -120,14 +124,23 @@ def _eigenvalues(diagonal: Array, beside: Array) -> Array:
     )
     angle = jnp.arccos(jnp.clip(determinant / 2, -1, 1)) / 3
     cosines = jnp.stack([jnp.cos(angle + turn * math.pi / 3) for turn in (0, 4, 2)])
-    return mean + 2 * size * cosines
+    return largest * (mean + 2 * size * cosines)
 
 
 def principal_stretches(F: Array) -> Array:
-    """Singular values of F, (3, ...), for bounds: see `_eigenvalues`."""
+    """Singular values of F, (3, ...), for bounds: see `_eigenvalues`.
+
+    Where the largest outweighs the other two, what it is off by would swamp them: these follow from
+    the trace and the determinant.
+    """
     B = left_strain(F)
     diagonal = jnp.stack([B[i, i] for i in range(3)])
     squares = 1 + _eigenvalues(diagonal, jnp.stack([B[0, 1], B[1, 2], B[2, 0]]))
+    first, mean = squares[0], 0.5 * (3 + jnp.sum(diagonal, axis=0) - squares[0])
+    product = algebra.determinant(F) ** 2 / first
+    second = mean + jnp.sqrt(jnp.maximum(mean**2 - product, 0))
+    small = jnp.stack([first, second, product / jnp.where(second > 0, second, 1)])
+    squares = jnp.where(first > 2 * mean, small, squares)
     return jnp.sqrt(jnp.maximum(squares, 8 * jnp.finfo(F.dtype).eps))
 
 
@@ -248,14 +261,33 @@ def isolated_bound(
     squeezed, stretched = (_lone_at(law, parameters, jnp.exp(side * e)) for side in (-1, 1))
     modulus = jnp.maximum(rest, jnp.maximum(squeezed, stretched))
     modulus = modulus * (1 + jnp.minimum(swing / SWING**2, 2))
+    swinging = _step_of(lone_length(transfer, spacing), density, modulus)
+    return jnp.minimum(
+        swinging, release_bound(law, parameters, F, s, density, spacing, GRADIENT, transfer)
+    )
+
+
+def release_bound(
+    law: Law,
+    parameters: Parameters,
+    F: Array,
+    s: Array,
+    density: Array,
+    spacing: float,
+    gradient: float,
+    transfer: Transfer = DEFAULT,
+) -> Array:
+    """How long a step may be, [s], (...), lest a particle alone be deformed by more than `gradient`
+    in one once the energy that it holds is all in its rate; s: `principal_stretches` of F.
+    """
     if law.principal_energy is not None:
         energy = law.principal_energy(parameters, s)
     elif law.energy is not None:
         energy = law.energy(parameters, F, law.at_start(density))
     else:
-        energy = jnp.zeros_like(density)
-    released = 8 / GRADIENT**2 * energy
-    return _step_of(lone_length(transfer, spacing), density, jnp.maximum(modulus, released))
+        return jnp.full_like(density, jnp.inf)
+    released = jnp.maximum(8 / gradient**2 * energy, jnp.finfo(density.dtype).tiny)
+    return _step_of(lone_length(transfer, spacing), density, released)
 
 
 def _lone_at(law: Law, parameters: Parameters, stretch: Array) -> Array:

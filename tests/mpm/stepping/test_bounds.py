@@ -16,7 +16,9 @@ from jaxphys.mpm.stepping.bounds import (
     isolated_bound,
     largest_stable_dt,
     moduli,
+    moduli_of,
     present_bounds,
+    principal_stretches,
     step_bounds,
     validate_dt,
 )
@@ -269,3 +271,35 @@ def test_a_step_over_the_bound_is_refused_with_the_largest_safe_one():
 def test_a_state_that_is_not_finite_gives_no_bound():
     with pytest.raises(InputError, match="not finite"):
         largest_stable_dt(*scene(velocity=float("nan")))
+
+
+# What is longer than wide, and what is stiffer than float32 squares.
+
+
+def test_stretches_of_needles_and_discs_in_float32():
+    random = np.random.default_rng(0)
+    turns = [np.linalg.qr(random.normal(size=(3, 3)))[0] for _ in range(40)]
+    shapes = ((20.0, 0.22, 0.22), (20.0, 20.0, 0.05), (20.0, 1.0, 0.05), (1.0, 1.0, 0.05))
+    for shape in shapes:
+        F = np.stack([Q @ np.diag(shape) @ P for Q, P in zip(turns, turns[::-1], strict=True)])
+        found = principal_stretches(jnp.asarray(np.moveaxis(F, 0, -1), jnp.float32))
+        expected = np.sort(np.linalg.svd(F, compute_uv=False), axis=1)
+        np.testing.assert_allclose(np.sort(np.asarray(found), axis=0).T, expected, rtol=0.05)
+
+
+def test_stretches_near_rest_keep_their_digits():
+    F = np.eye(3)[..., None] + 1e-4 * np.random.default_rng(1).normal(size=(3, 3, 50))
+    found = principal_stretches(jnp.asarray(F, jnp.float32))
+    expected = np.linalg.svd(np.moveaxis(F, -1, 0), compute_uv=False)
+    strains = np.sort(np.asarray(found, np.float64), axis=0).T - 1
+    np.testing.assert_allclose(strains, np.sort(expected, axis=1) - 1, atol=4e-7)
+
+
+def test_the_stiffest_has_a_bound_in_float32():
+    """lambda J^2 of steel at 20 times its size is 1e18 Pa, whose square float32 cannot hold."""
+    F = jnp.asarray(20 * np.eye(3)[..., None], jnp.float32)
+    steel = {"youngs_modulus": jnp.float32(1e12), "poisson_ratio": jnp.float32(0.3)}
+    narrow = moduli_of(FIXED_COROTATED, steel, F)[1]
+    wide = moduli_of(FIXED_COROTATED, jax.tree.map(np.float64, steel), F.astype(jnp.float64))[1]
+    assert float(wide[0]) > 2e19
+    np.testing.assert_allclose(narrow, wide, rtol=1e-3)
