@@ -27,7 +27,7 @@ from jaxphys.mpm.loop.status import NO_FAILURE, least
 from jaxphys.mpm.loop.step_check import stiffening
 from jaxphys.mpm.state import OK, TOO_MANY_STEPS, UNSTABLE_STEP, Config, Model, State
 from jaxphys.mpm.stepping.adaptive import GROWTH, LEAST, Adaptive, Steps, matter_bounds, next_steps
-from jaxphys.mpm.stepping.bounds import ADVECTION, GRADIENT, contact_bound
+from jaxphys.mpm.stepping.bounds import ADVECTION, GRADIENT, SAFETY, contact_bound
 from jaxphys.mpm.stepping.fixed import MOST_STEPS
 
 
@@ -109,18 +109,14 @@ def _lasting(passes: Passes, chunks: Chunks, begin: Array, duration: Array) -> L
     speed = jnp.max(jnp.stack([jnp.zeros(()), *speeds])).astype(model.mass.dtype)
     F, history = stiffening(config, chunks.particles)
     rest = tuple(jnp.broadcast_to(jnp.eye(3, dtype=f.dtype)[..., None], f.shape) for f in F)
-    _, limit, _ = _of_matter(passes, rest, history, LEAST)
-    return Lasting(contact_bound(model, config.grid), speed, LEAST * limit)
+    _, limit, _ = _of_matter(passes, rest, history, SAFETY, jnp.zeros((), model.mass.dtype))
+    return Lasting(contact_bound(model, config.grid), speed, LEAST / SAFETY * limit)
 
 
 def _look(passes: Passes, chunks: Chunks, safety: float, fixed: Lasting):
     """(step to take [s], limit of stability [s], the particle that decides of matter), () each."""
-    wanted, limit, particle = _of_matter(
-        passes, *stiffening(passes.config, chunks.particles), safety
-    )
-    # What is strained swings back, so that its stiffness now is not that of its swing: within the
-    # limit a step need not be shorter than fixed ones would be.
-    wanted = jnp.minimum(safety * limit, jnp.maximum(wanted, fixed.swing))
+    F, history = stiffening(passes.config, chunks.particles)
+    wanted, limit, particle = _of_matter(passes, F, history, safety, fixed.swing)
     assert chunks.rates is not None  # what `Config.tells_rates` is for
     speed, rate = fastest(chunks.rates, wanted.dtype)
     advection = ADVECTION * passes.config.grid.spacing / jnp.maximum(speed, fixed.boundaries)
@@ -128,17 +124,18 @@ def _look(passes: Passes, chunks: Chunks, safety: float, fixed: Lasting):
     return jnp.minimum(wanted, safety * others), jnp.minimum(limit, fixed.contact), particle
 
 
-def _of_matter(passes: Passes, F: tuple, history: tuple, safety: float):
+def _of_matter(passes: Passes, F: tuple, history: tuple, safety: float, swing: Array):
     """`_weakest` of all devices, for deformations and histories of each run."""
     config = passes.config
     own = passes.matter, passes.flags, F, history, passes.names
-    run = spread(
-        config.placement, lambda _, own: (_weakest(config, safety, own), None), _least_of_devices
-    )
-    return run(None, own)[0]
+
+    def on_device(swing, own):
+        return _weakest(config, safety, swing, own), None
+
+    return spread(config.placement, on_device, _least_of_devices)(swing, own)[0]
 
 
-def _weakest(config: Config, safety: float, own) -> tuple[Array, Array, Array]:
+def _weakest(config: Config, safety: float, swing: Array, own) -> tuple[Array, Array, Array]:
     """The least `matter_bounds` [s] of any particle, and the first that has the least step. Chunk
     by chunk: all at once would go through memory some twenty times.
     """
@@ -151,7 +148,7 @@ def _weakest(config: Config, safety: float, own) -> tuple[Array, Array, Array]:
         parameters = law.present(matter.parameters, history)
         density = matter.mass / jnp.where(matter.mass > 0, matter.volume, 1)
         parts = matter_bounds(
-            law, parameters, F, density, config.grid.spacing, safety, config.transfer
+            law, parameters, F, density, config.grid.spacing, safety, swing, config.transfer
         )
         # NaN counts as the least of all.
         wanted, limit = (jnp.where(jnp.isnan(part), -1, part) for part in parts)

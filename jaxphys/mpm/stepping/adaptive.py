@@ -61,17 +61,23 @@ def matter_bounds(
     density: Array,
     spacing: float,
     safety: float,
+    swing: Array | float = 0.0,
     transfer: Transfer = bounds.DEFAULT,
 ) -> tuple[Array, Array]:
     """(wanted, limit) [s] of each particle, (...): the step to take, if matter alone decides, and
     the one beyond which it is unstable as it is now deformed.
+
+    swing: [s] that matter bears which swings about its rest, () or (...), of which as of its limit
+    `safety` is taken. What is strained swings back, so that its stiffness now is not that of its
+    swing: within the limit a step need not be shorter than fixed ones would be.
     """
     limit = bounds.hard_limit(law, parameters, F, density, spacing, transfer)
     s = bounds.principal_stretches(F)
-    swing = jnp.max((s - 1) ** 2, axis=0) / bounds.SWING**2
-    share = jnp.maximum(LEAST / bounds.SAFETY, 1 / jnp.sqrt(1 + swing))
+    strained = jnp.max((s - 1) ** 2, axis=0) / bounds.SWING**2
+    share = jnp.maximum(LEAST / bounds.SAFETY, 1 / jnp.sqrt(1 + strained))
     released = bounds.release_bound(law, parameters, F, s, density, spacing, RELEASE, transfer)
-    return safety * jnp.minimum(share * limit, released), limit
+    borne = jnp.maximum(share * limit, jnp.minimum(limit, swing))
+    return safety * jnp.minimum(borne, released), limit
 
 
 def next_steps(left: Array, bound: Array, most: int) -> tuple[Array, Array]:
