@@ -58,6 +58,7 @@ OPTIONAL: Mapping[str, tuple[str, str]] = MappingProxyType(
         "return map": ("a law is plastic", "no law is plastic"),
         "viscosity": ("a fluid has it", "no fluid has any"),
         "history": ("a law remembers", "no law remembers"),
+        "mean volume": ("an object takes its neighbours'", "no object asks for it"),
         "implicit step": ("the scene asks for it", "steps are explicit"),
         "second deformation gradient": (
             "plastic flow must be seen in the splats",
@@ -235,7 +236,7 @@ def describe(scene: Scene, built: Built) -> Plan:
     slabs = slabs_for(simulation.stepping)
     first = windowed(simulation.config, simulation.state, slabs=slabs)
     placement, transfer = simulation.config.placement, simulation.config.transfer
-    row, stencil = 4 * transfer.columns, transfer.spline.width**3
+    row, stencil = 4 * simulation.config.columns, transfer.spline.width**3
     chunk = max(into.size for into in cuts(simulation.config.runs, placement))
     particles, drawn = simulation.config.particles, look.gaussians.count
     nodes = int(np.prod(simulation.config.grid.shape))
