@@ -1,5 +1,5 @@
-"""Cook's membrane: a tapered panel in plane strain, clamped at its left edge, pulled up at its right
-one and nearly incompressible, so that elements and particles lock.
+"""Cook's membrane: a tapered panel in plane strain, clamped at its left edge, pulled up at its
+right one and nearly incompressible, so that elements and particles lock.
 
 Cook (1974), "Improved two-dimensional finite element", J. Struct. Div. ASCE 100; at these moduli de
 Souza Neto, Peric, Dutko and Owen (1996), "Design of simple low order finite elements for large

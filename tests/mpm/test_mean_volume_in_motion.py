@@ -27,10 +27,11 @@ from .test_forward_mode import agree, both_directions, direction_of, loss_by
 from .test_placement import DEVICES, SLABS, mixed, same
 
 DT = 5e-4
+APIC_QUADRATIC = Transfer()
 SHARED = 30  # of the particles, those whose stress is at the mean volume
 
 
-def halves(transfer=Transfer(), **options):
+def halves(transfer=APIC_QUADRATIC, **options):
     """A random block whose first part takes the mean volume and whose other has its own."""
     config, model, state = block(count=50, law=at_mean_volume(NEO_HOOKEAN))
     segments = (config.segments[0][0], 0, SHARED), (NEO_HOOKEAN, SHARED, 50)

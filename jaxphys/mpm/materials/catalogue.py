@@ -128,7 +128,7 @@ _materials: dict[str, Material] = {
             "flows when pushed, holds a heap when left alone (Herschel-Bulkley)",
             bulk_modulus=2e5,
             shear_modulus=1e4,
-            shear_yield_stress=250.0,
+            shear_yield_stress=500.0,
             consistency=50.0,
             flow_index=0.5,
             density=500.0,
