@@ -155,7 +155,7 @@ def _dropped(
 
 
 def _water(domain: Domain) -> Scene:
-    scene = _dropped("water", domain, size=0.7, gap=0.1, speed=0.0, friction=0.0)
+    scene = _dropped("water", domain, size=0.6, gap=0.02, speed=0.0, friction=0.0)
     # Within the domain's walls it would lie a cell deep.
     tank = Walls(inset=TANK, surfaces=(*("separate",) * 4, "open", "open"))
     return replace(scene, boundaries=(*scene.boundaries, tank))
@@ -175,7 +175,12 @@ def _plasticine(domain: Domain) -> Scene:
 
 
 def _snow(domain: Domain) -> Scene:
-    return _dropped("snow", domain, gap=0.2, speed=5.0)
+    turn = (Rotation((0.0, 1.0, 0.0), 20.0),)
+    scene = _dropped("snow", domain, gap=0.2, speed=6.0, rotation=turn)
+    # Packed snow has no friction of its own: from a floor that lets go it would hop on like rubber.
+    _, *others = scene.boundaries
+    floor = Plane((MIDDLE, MIDDLE, FLOOR), surface="sticky", acts_on="particles")
+    return replace(scene, boundaries=(floor, *others))
 
 
 def _wet_sand(domain: Domain) -> Scene:
