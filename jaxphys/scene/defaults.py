@@ -175,12 +175,8 @@ def _plasticine(domain: Domain) -> Scene:
 
 
 def _snow(domain: Domain) -> Scene:
-    turn = (Rotation((0.0, 1.0, 0.0), 20.0),)
-    scene = _dropped("snow", domain, gap=0.2, speed=6.0, rotation=turn)
-    # Packed snow has no friction of its own: from a floor that lets go it would hop on like rubber.
-    _, *others = scene.boundaries
-    floor = Plane((MIDDLE, MIDDLE, FLOOR), surface="sticky", acts_on="particles")
-    return replace(scene, boundaries=(floor, *others))
+    # What has been packed is elastic: without damping it would hop on like rubber.
+    return _dropped("snow", domain, gap=0.2, speed=6.0, friction=0.8, damping=3.0)
 
 
 def _wet_sand(domain: Domain) -> Scene:
