@@ -148,7 +148,7 @@ def move(
         with part("second deformation gradient"):
             total, total_rest = compensated.add(total, carried.total, dt * algebra.matmul(C, total))
     moved = particles._replace(position=position, deformation=F, total=total)
-    if law.shares_volume and flow.volume is not None:
+    if law.shares_volume and flow.volume is not None and particles.history is not None:
         with part("mean volume"):
             ratio = jnp.log1p(flow.volume) - jnp.log1p(volume_change(particles.deformation))
             moved = moved._replace(history=jnp.where(still, particles.history, ratio[None]))
