@@ -107,6 +107,18 @@ class Config:
         return self.transfer.spline
 
     @property
+    def shares_volume(self) -> bool:
+        """Whether particles tell the grid their volumes, for a law that asks for their mean."""
+        return any(law.shares_volume for law, _, _ in self.segments)
+
+    @property
+    def columns(self) -> int:
+        """Numbers of a node: momentum and mass, and four more where momentum before forces acted or
+        volumes are told, too.
+        """
+        return 8 if self.transfer.keeps_velocity or self.shares_volume else 4
+
+    @property
     def nodes(self) -> tuple[int, int, int]:
         """Shape of the part of the grid that a device computes."""
         shape = self.window or self.grid.shape

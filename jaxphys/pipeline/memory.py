@@ -38,7 +38,7 @@ def expected(scene: Scene, built: Built) -> dict[str, int]:
     simulation, look = built
     config = simulation.config
     placement, transfer = config.placement, config.transfer
-    row, stencil = 4 * transfer.columns, transfer.spline.width**3
+    row, stencil = 4 * config.columns, transfer.spline.width**3
     chunk = max(into.size for into in cuts(config.runs, placement))
     window = windowed(config, simulation.state).computed.nodes
     arrays = jax.tree.leaves((simulation.state, simulation.model))

@@ -59,6 +59,7 @@ OPTIONAL: Mapping[str, tuple[str, str]] = MappingProxyType(
         "return map": ("a law is plastic", "no law is plastic"),
         "viscosity": ("a fluid has it", "no fluid has any"),
         "history": ("a law remembers", "no law remembers"),
+        "mean volume": ("an object takes its neighbours'", "no object asks for it"),
         "implicit step": ("the scene asks for it", "steps are explicit"),
         "second deformation gradient": (
             "plastic flow must be seen in the splats",

@@ -18,6 +18,7 @@ from jaxphys.mpm.loop.implicit.step import check_implicit
 from jaxphys.mpm.loop.placement import suited
 from jaxphys.mpm.loop.sorting import cell_order, inverse_order
 from jaxphys.mpm.materials.catalogue import (
+    Material,
     assemble_parameters,
     get_material,
     material_values,
@@ -82,6 +83,10 @@ def validate(scene: Scene) -> None:
             get_material(thing.material, thing.law)
         except InputError as error:
             raise InputError(f"{where}.law: {error}") from None
+        try:
+            material_of(thing)
+        except InputError as error:
+            raise InputError(f"{where}.{error}") from None
         for label, parameters in [
             (f"{where}.parameters", thing.parameters),
             *(
@@ -93,6 +98,11 @@ def validate(scene: Scene) -> None:
                 material_values(material, parameters)
             except InputError as error:
                 raise InputError(f"{label}: {error}") from None
+
+
+def material_of(thing: Object) -> Material:
+    """The material of an object, with the law that it asks for."""
+    return get_material(thing.material, thing.law, mean_volume=thing.mean_volume)
 
 
 def solver_grid(scene: Scene) -> Grid:
@@ -123,7 +133,7 @@ def particles_of(placed: Placed, thing: Object) -> Particles:
     x, y, z = np.asarray(thing.spin, np.float64)
     gradient = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     arms = positions - np.asarray(thing.centre)
-    material = get_material(thing.material, thing.law)
+    material = material_of(thing)
     values = material_values(material, thing.parameters)
     for region in thing.regions:
         offset = np.abs(positions - np.asarray(region.centre))
@@ -153,7 +163,7 @@ def solver_parts(
     """Program, numbers and start for the solver, in the solver's order."""
     grid = solver_grid(scene)
     described = [
-        (get_material(thing.material, thing.law), part.values, len(part.positions))
+        (material_of(thing), part.values, len(part.positions))
         for thing, part in zip(scene.objects, parts, strict=True)
     ]
     parameters, density, segments = assemble_parameters(described, dtype)

@@ -6,6 +6,7 @@ that a second of motion takes some hundred steps on the coarse grid.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Literal
 
@@ -22,6 +23,7 @@ MIDDLE = SIDE / 2
 # cells outside it.
 FLOOR = 0.25
 INSET = 0.2
+TANK = 0.6  # from the domain's sides to those of the glass tank that water is poured into
 
 
 def default_scene(material: str, *, spacing: float = SPACING) -> Scene:
@@ -153,7 +155,10 @@ def _dropped(
 
 
 def _water(domain: Domain) -> Scene:
-    return _dropped("water", domain, size=0.7, gap=0.3, speed=1.0, friction=0.0)
+    scene = _dropped("water", domain, size=0.6, gap=0.02, speed=0.0, friction=0.0)
+    # Within the domain's walls it would lie a cell deep.
+    tank = Walls(inset=TANK, surfaces=(*("separate",) * 4, "open", "open"))
+    return replace(scene, boundaries=(*scene.boundaries, tank))
 
 
 def _cream(domain: Domain) -> Scene:
@@ -170,7 +175,8 @@ def _plasticine(domain: Domain) -> Scene:
 
 
 def _snow(domain: Domain) -> Scene:
-    return _dropped("snow", domain, gap=0.2, speed=5.0)
+    # What has been packed is elastic: without damping it would hop on like rubber.
+    return _dropped("snow", domain, gap=0.2, speed=6.0, friction=0.8, damping=3.0)
 
 
 def _wet_sand(domain: Domain) -> Scene:

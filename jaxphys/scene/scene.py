@@ -102,6 +102,8 @@ class Object(Checked):
             command line.
         material: a name that `jaxphys materials` lists.
         law: one of the other laws that the material may have; null: its own.
+        mean_volume: stress at the volume that neighbours share, without which what hardly changes
+            its volume (Poisson's ratio from 0.49 on) bends too little; of elastic laws.
         parameters: what differs from the material's defaults, by name.
         regions: boxes with other parameters; later ones win.
         size: longest side after rotation [m].
@@ -119,6 +121,7 @@ class Object(Checked):
     source: str | None = None
     material: str = "jelly"
     law: str | None = None
+    mean_volume: bool = False
     parameters: dict[str, float] = field(default_factory=dict)
     regions: tuple[Region, ...] = ()
     size: float = field(default=1.0, metadata=LENGTH)

@@ -11,9 +11,12 @@ import pytest
 from jaxphys.mpm.boundaries import Plane, Setting, prepare
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.rollout import rollout
-from jaxphys.mpm.loop.status import check
+from jaxphys.mpm.loop.status import SimulationError, check
 from jaxphys.mpm.materials.catalogue import MATERIALS
-from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
+from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
+from jaxphys.mpm.materials.fibres import FIBRES
+from jaxphys.mpm.materials.mean_volume import at_mean_volume
+from jaxphys.mpm.materials.viscoelasticity import STANDARD_SOLID
 from jaxphys.mpm.state import OK, UNSTABLE_STEP, Config, Model, initial_state
 from jaxphys.mpm.stepping.bounds import largest_stable_dt, with_wave_modulus
 
@@ -118,18 +121,52 @@ def test_snow_that_has_hardened_fails_a_step_that_was_good_for_it():
     assert largest_stable_dt(config, model, packed).dt < dt
 
 
-def test_what_is_flattened_springs_back():
-    """A particle alone, pressed to a fiftieth, swings out and back for some thirty times."""
-    config = Config(Grid((5, 5, 5), 0.1), ((NEO_HOOKEAN, 0, 1),))
-    flat = np.diag([1.0, 1.0, 0.02])[None]
-    state = initial_state(config, [[0.2, 0.21, 0.19]], deformation=flat, dtype=jnp.float64)
-    numbers = {"youngs_modulus": jnp.full(1, 1e3), "poisson_ratio": jnp.full(1, 0.4)}
-    model = Model(jnp.full(1, 0.05), jnp.full(1, 1.25e-4), numbers, None)
-    dt = largest_stable_dt(config, model, state).dt
-    run = jax.jit(partial(rollout, config, dt=dt, steps=20))
+ELASTIC = (NEO_HOOKEAN, FIXED_COROTATED, HENCKY, FIBRES, STANDARD_SOLID)
+ELASTIC += (at_mean_volume(NEO_HOOKEAN),)
+
+
+@pytest.fixture(scope="module")
+def lone():
+    """A particle of each elastic law, alone: (state of gradients F, 20 steps, step)."""
+    count = len(ELASTIC)
+    segments = tuple((law, i, i + 1) for i, law in enumerate(ELASTIC))
+    config = Config(Grid((5, 5, 4 * count + 1), 0.1), segments, check_step=False)
+    position = np.array([[0.2, 0.21, 0.4 * i + 0.19] for i in range(count)])
+    numbers = {name: jnp.full(count, NUMBERS[name] * UNITS.get(name, 1)) for name in NUMBERS}
+    model = Model(jnp.full(count, 0.05), jnp.full(count, 1.25e-4), numbers, None)
+    start = initial_state(config, position, dtype=jnp.float64)
+
+    def deformed(F):
+        return start._replace(deformation=jnp.moveaxis(jnp.asarray(F), 0, -1))
+
+    flat = deformed(np.broadcast_to(np.diag([1.0, 1.0, 0.1]), (count, 3, 3)))
+    # At rest the stiffest allows 25 ms, and is a hundred times stiffer at a tenth.
+    return deformed, jax.jit(partial(rollout, config, model, dt=1e-3, steps=20)), flat
+
+
+def test_what_is_flattened_springs_back(lone):
+    """Pressed to a tenth, it swings out and back."""
+    _, run, state = lone
     thickness = []
     for _ in range(60):
-        state = run(model, state)
-        thickness.append(float(state.deformation[2, 2, 0]))
+        state = run(state)
+        thickness.append(np.asarray(state.deformation[2, 2]))
     check(state.status)
-    assert max(thickness) > 1 and min(thickness[10:]) < 0.5
+    assert np.all(np.max(thickness, axis=0) > 0.9)
+    volume = np.linalg.det(np.moveaxis(np.asarray(state.deformation), -1, 0))
+    assert np.all((volume > 0.05) & (volume < 10))
+
+
+@pytest.mark.parametrize("which", range(len(ELASTIC)), ids=[law.name for law in ELASTIC])
+def test_what_is_turned_inside_out_or_crushed_is_one_error(lone, which):
+    """A start that `initial_state` did not see, of which it would have been refused. What has the
+    logarithm of J has no stress then, and is told by that.
+    """
+    deformed, run, _ = lone
+    inside_out = "(is turned inside out|became infinite or not a number)"
+    for thickness, words in ((-0.9, inside_out), (5e-4, "was pressed to less")):
+        F = np.tile(np.eye(3), (len(ELASTIC), 1, 1))
+        F[which, 2, 2] = thickness
+        with pytest.raises(SimulationError, match=f"particle {which} {words}") as error:
+            check(run(deformed(F)).status)
+        assert "\n" not in str(error.value)

@@ -56,6 +56,7 @@ def test_the_plainest_scene_holds_nothing_optional(plain):
         ("eigen-decomposition", scene("metal")),
         ("return map", scene("metal")),
         ("history", scene("fracture")),
+        ("mean volume", with_object(scene(), mean_volume=True)),
         ("second deformation gradient", scene("metal")),
         ("colour regularisation", scene(regularise_colours=True)),
         ("drawn floor", scene(ground=Ground(0.1))),

@@ -7,12 +7,15 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
+from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
+from jaxphys.mpm.materials.mean_volume import at_mean_volume
 from jaxphys.mpm.materials.plasticity import (
     PERFECT_VON_MISES,
     UNCORRECTED_DRUCKER_PRAGER,
     VON_MISES,
     triaxial_friction_angle,
 )
+from jaxphys.mpm.stepping import Implicit
 from jaxphys.scene import Domain, Object, Region, Scene, scene_from_json, to_json
 from jaxphys.scene.build import build
 
@@ -41,6 +44,20 @@ def test_sand_without_volume_correction():
 def test_a_law_that_the_material_cannot_have():
     with pytest.raises(InputError, match=r"objects\[0\].law: sand cannot have the law 'Hencky'"):
         simulated(made_of("sand", law="Hencky"))
+
+
+def test_stress_at_the_mean_volume():
+    law = "neo-Hookean"
+    simulation = simulated(made_of("jelly", law=law, mean_volume=True))
+    ((found, _, _),) = simulation.config.segments
+    assert found is at_mean_volume(NEO_HOOKEAN) and simulation.config.columns == 8
+    np.testing.assert_array_equal(simulation.state.history, np.zeros((1, 30)))
+    assert simulated(made_of("jelly", law=law)).config.columns == 4
+    with pytest.raises(InputError, match=r"objects\[0\].mean_volume: the law 'von Mises' flows"):
+        simulated(made_of("metal", mean_volume=True))
+    implicit = dataclasses.replace(made_of("jelly", mean_volume=True), stepping=Implicit())
+    with pytest.raises(InputError, match="at the mean volume' has a stress that no energy gives"):
+        simulated(implicit)
 
 
 @pytest.mark.parametrize(("hardening", "law"), [(0.0, PERFECT_VON_MISES), (1e3, VON_MISES)])

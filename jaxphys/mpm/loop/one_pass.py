@@ -193,11 +193,14 @@ def _forward_chunks(config: Config, last: bool, common, own):
     seen, results = nothing_seen(config), []
 
     def taken(particles):
-        return Flow.of(*gather(window, stencil(window, origin, particles.position), nodes))
+        at = stencil(window, origin, particles.position)
+        return Flow.of(config, *gather(window, at, nodes))
 
-    def moved(matter, numbers, particles, residual, flow):
+    def moved(law, matter, numbers, particles, residual, flow):
         before = particles.position
-        particles, residual, flow = move(config, shared, matter, particles, residual, flow, first)
+        particles, residual, flow = move(
+            config, law, shared, matter, particles, residual, flow, first
+        )
         C = velocity_gradient(config, flow)
         code = failure(
             config,
@@ -214,10 +217,10 @@ def _forward_chunks(config: Config, last: bool, common, own):
         below, told = extent(config, particles.position), slowest(config, flow.velocity, C)
         return particles, residual, flow, Seen(fault, below, told)
 
-    def of_last(seen, chunk):
+    def of_last(law, seen, chunk):
         matter, flags, numbers, particles, residual = chunk
         flow = taken(particles)
-        *results, seen_too = moved(whole(matter, flags), numbers, particles, residual, flow)
+        *results, seen_too = moved(law, whole(matter, flags), numbers, particles, residual, flow)
         return seen.also(seen_too), (*results, flow)
 
     def of_other(law, start, carry, chunk):
@@ -236,7 +239,7 @@ def _forward_chunks(config: Config, last: bool, common, own):
             return particles, residual, taken(particles)
 
         particles, residual, flow = jax.lax.cond(first, started, went_on)
-        particles, residual, used, seen_too = moved(matter, numbers, particles, residual, flow)
+        particles, residual, used, seen_too = moved(law, matter, numbers, particles, residual, flow)
         particles, momentum, affine, own = give(config, law, shared, matter, particles, used)
         at = stencil(window, target, particles.position)
         rows = scatter(window, at, rows, matter.mass, momentum, affine)
@@ -252,7 +255,7 @@ def _forward_chunks(config: Config, last: bool, common, own):
         config.runs, *for_runs(own, config), strict=True
     ):
         if last:
-            seen, result = jax.lax.scan(of_last, seen, (*parts, particles, residual))
+            seen, result = jax.lax.scan(partial(of_last, law), seen, (*parts, particles, residual))
         else:
             count = jnp.arange(len(parts[-1]))
             (rows, wrench, seen, state), flow = jax.lax.scan(

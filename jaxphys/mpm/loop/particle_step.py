@@ -12,6 +12,7 @@ from jax import Array
 
 from jaxphys.core import algebra, compensated
 from jaxphys.core.program import part
+from jaxphys.core.spectral import volume_change
 from jaxphys.mpm.boundaries import stages
 from jaxphys.mpm.boundaries.free import Wrench
 from jaxphys.mpm.materials.law import Law
@@ -62,27 +63,37 @@ class Flow(NamedTuple):
     """Velocity (3, N) [m/s] and its first moment (3, 3, N) [m^2/s] at some particles.
 
     before: (3, N) [m/s] what the velocity was before forces and boundaries acted on the grid, or
-    None where no particle has a velocity of its own.
+    None where no particle has a velocity of its own. volume: (N,) mean of J - 1 around each, by
+    mass, or None where no law asks for it.
     """
 
     velocity: Array
     moment: Array
     before: Array | None = None
+    volume: Array | None = None
 
     @classmethod
-    def of(cls, sums: Array, moments: Array) -> "Flow":
+    def of(cls, config: Config, sums: Array, moments: Array) -> "Flow":
         """What `gather` gives, by names."""
-        if len(sums) == 4:
-            return cls(sums[:3], moments)
-        return cls(sums[:3], moments[:3], sums[4:7])
+        before = volume = None
+        others = sums[4:]
+        if config.transfer.keeps_velocity:
+            before, others = others[:3], others[3:]
+        if config.shares_volume:
+            volume = others[0]
+        return cls(sums[:3], moments[:3], before, volume)
 
     @property
     def vectors(self) -> tuple[Array, Array]:
         """Its vectors and their moments, as `scatter` takes them."""
-        if self.before is None:
+        others = [] if self.before is None else [self.before]
+        if self.volume is not None:
+            others.append(self.volume[None])
+        if not others:
             return self.velocity, self.moment
-        vectors = jnp.concatenate([self.velocity, self.before])
-        return vectors, jnp.concatenate([self.moment, jnp.zeros_like(self.moment)])
+        more = jnp.concatenate(others)
+        none = jnp.zeros((len(more), *self.moment.shape[1:]), self.moment.dtype)
+        return jnp.concatenate([self.velocity, more]), jnp.concatenate([self.moment, none])
 
 
 def velocity_gradient(config: Config, flow: Flow) -> Array:
@@ -92,6 +103,7 @@ def velocity_gradient(config: Config, flow: Flow) -> Array:
 
 def move(
     config: Config,
+    law: Law,
     shared: Shared,
     matter: Matter,
     particles: Particles,
@@ -136,6 +148,10 @@ def move(
         with part("second deformation gradient"):
             total, total_rest = compensated.add(total, carried.total, dt * algebra.matmul(C, total))
     moved = particles._replace(position=position, deformation=F, total=total)
+    if law.shares_volume and flow.volume is not None and particles.history is not None:
+        with part("mean volume"):
+            ratio = jnp.log1p(flow.volume) - jnp.log1p(volume_change(particles.deformation))
+            moved = moved._replace(history=jnp.where(still, particles.history, ratio[None]))
     kept = Residual(position_rest, F_rest, total_rest, None)
     if own is not None:
         moved = moved._replace(velocity=own)
@@ -151,9 +167,9 @@ def give(
     config: Config, law: Law, shared: Shared, matter: Matter, particles: Particles, flow: Flow
 ) -> tuple[Particles, Array, Array, Wrench | None]:
     """Particles past their law (return map and stress of the trial gradient together) and past
-    contact, and what they give to the grid: momentum (3, N) [kg m/s] and affine part (3, 3, N), or
-    (6, N) and (6, 3, N) with what the two are without stress and contact; and what of it a rigid
-    body gave.
+    contact, and what they give to the grid: momentum (3, N) [kg m/s] and affine part (3, 3, N),
+    followed by what the two are without stress and contact where particles have a velocity of their
+    own, and by m (J - 1) where volumes are shared; and what of it a rigid body gave.
     """
     history = particles.history
     kept = jnp.zeros((0, *matter.mass.shape), matter.mass.dtype) if history is None else history
@@ -183,6 +199,11 @@ def give(
         momentum = jnp.concatenate([momentum if given is None else momentum + given, momentum])
     elif given is not None:
         momentum = momentum + given
+    if config.shares_volume:
+        with part("mean volume"):
+            change = matter.mass * volume_change(F)
+            momentum = jnp.concatenate([momentum, change[None]])
+            affine = jnp.concatenate([affine, jnp.zeros_like(affine[:1])])
     after = particles._replace(deformation=F, slip=slip)
     if history is not None:
         after = after._replace(history=kept)
@@ -191,7 +212,8 @@ def give(
 
 def update_grid(shared: Shared, lightest: Array, rows: Array) -> Array:
     """Node velocities [m/s] from momentum and mass rows, both (M, 4), column 3 of what it gives
-    being void; or (M, 8), where the second half has what velocities were before any force.
+    being void; or (M, 8), where the second half has what forces leave alone: what velocities were
+    before any, or mean volumes.
 
     lightest: [kg] () nodes with no more stand still: below eps^2 of the heaviest particle a node
     adds less than round-off to any particle, and dividing by its mass could overflow.

@@ -182,7 +182,7 @@ def _between(config: Config, last: bool, law, flags, first: Array):
 
     def between(shared, matter, particles, flow: Flow):
         matter = whole(matter, flags)
-        moved, _, flow = move(config, shared, matter, particles, None, flow, first)
+        moved, _, flow = move(config, law, shared, matter, particles, None, flow, first)
         if last:
             return moved, flow
         return give(config, law, shared, matter, moved, flow)
@@ -202,7 +202,8 @@ def _tangent_chunks(config: Config, last: bool, common, own):
     def of_chunk(law, sums, chunk):
         matter, flags, particles, gathered, of_matter, of_start, of_particles = chunk
         at = stencil(window, origin, particles.position)
-        flow = Flow.of(*gather_tangent(window, at, nodes, of_particles.position, of_nodes))
+        moved = of_particles.position
+        flow = Flow.of(config, *gather_tangent(window, at, nodes, moved, of_nodes))
         if not last:
             flow = jax.tree.map(lambda a, b: jnp.where(first, a, b), of_start, flow)
         results, rates = jax.jvp(

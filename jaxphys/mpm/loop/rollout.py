@@ -267,7 +267,9 @@ def flows_of(config: Config, state: State, segments, order) -> tuple[Flow, ...]:
     moment = state.affine * (config.grid.spacing**2 / config.kernel.inverse_inertia)
     # Before the first step no force has acted.
     before = state.velocity if config.transfer.keeps_velocity else None
-    flow = Flow(state.velocity, moment, before)
+    # Nothing moves before the first step, so that each particle's share of the volume stays.
+    volume = jnp.zeros_like(state.position[0]) if config.shares_volume else None
+    flow = Flow(state.velocity, moment, before, volume)
     return tuple(cut(flow, into, order) for into in segments)
 
 
@@ -292,9 +294,7 @@ def cut_state(config: Config, state: State, segments, order) -> Chunks:
     return Chunks(
         tuple(particles),
         tuple(residuals),
-        jnp.zeros(
-            (config.parts * config.computed.nodes, config.transfer.columns), state.position.dtype
-        ),
+        jnp.zeros((config.parts * config.computed.nodes, config.columns), state.position.dtype),
         jnp.zeros(3 if config.slabs is None else (config.parts, 3), jnp.int32),
         below,
         slowest(config, *jax.lax.stop_gradient((state.velocity, state.affine))),

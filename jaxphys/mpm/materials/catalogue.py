@@ -17,6 +17,7 @@ from jaxphys.mpm.materials.fibres import FIBRES
 from jaxphys.mpm.materials.fluid import FLUID
 from jaxphys.mpm.materials.fracture import FRACTURE
 from jaxphys.mpm.materials.law import Law
+from jaxphys.mpm.materials.mean_volume import at_mean_volume
 from jaxphys.mpm.materials.parameters import DENSITY, Alternative, Parameter, check_parameter
 from jaxphys.mpm.materials.plasticity import DRUCKER_PRAGER, UNCORRECTED_DRUCKER_PRAGER, VON_MISES
 from jaxphys.mpm.materials.snow import SNOW
@@ -127,7 +128,7 @@ _materials: dict[str, Material] = {
             "flows when pushed, holds a heap when left alone (Herschel-Bulkley)",
             bulk_modulus=2e5,
             shear_modulus=1e4,
-            shear_yield_stress=250.0,
+            shear_yield_stress=500.0,
             consistency=50.0,
             flow_index=0.5,
             density=500.0,
@@ -214,22 +215,23 @@ def declared_parameters() -> dict[str, Parameter]:
     return found
 
 
-def get_material(name: str, law: str | None = None) -> Material:
-    """The material called `name`, with the law called `law` in place of its own if there is one.
+def get_material(name: str, law: str | None = None, *, mean_volume: bool = False) -> Material:
+    """The material called `name`, with the law called `law` in place of its own if there is one;
+    mean_volume: with the stress at the volume that neighbours share (`materials.mean_volume`).
 
     Raises:
         InputError: there is no such material, or it cannot have this law; the message gives the
-            nearest name.
+            nearest name. Or the law is not elastic, and there is no stress at a mean volume.
     """
     if name not in MATERIALS:
         raise InputError(f"unknown material {name!r}; {nearest(name, MATERIALS)}")
     material = MATERIALS[name]
-    if law is None:
-        return material
-    laws = {one.name: one for one in (material.law, *material.others)}
-    if law not in laws:
-        raise InputError(f"{name} cannot have the law {law!r}; {nearest(law, laws)}")
-    return replace(material, law=laws[law])
+    if law is not None:
+        laws = {one.name: one for one in (material.law, *material.others)}
+        if law not in laws:
+            raise InputError(f"{name} cannot have the law {law!r}; {nearest(law, laws)}")
+        material = replace(material, law=laws[law])
+    return replace(material, law=at_mean_volume(material.law)) if mean_volume else material
 
 
 def overridden(material: Material, overrides: Mapping | None) -> dict:

@@ -46,6 +46,8 @@ class Law:
         breaks: whether it loses its tension for good, so that pieces are worth counting.
         without: (parameter, law) pairs: the law that this one becomes where the parameter is zero.
         omits: parameters that this law leaves out of the program, being such a one.
+        shares_volume: whether its stress is that of the mean volume around a particle
+            (`mean_volume`): the loop then writes the one row of its history, log(Jm / J).
         trial: (parameters, F (3, 3, ...), history) -> Kirchhoff stress (3, 3, ...) [Pa] of an F
             that flows no further: the derivative of `energy` while the history stands still, for
             implicit steps. None: the stress that `update` gives, or of a plastic law the derivative
@@ -74,6 +76,7 @@ class Law:
     plastic: bool
     spectral: bool = False
     breaks: bool = False
+    shares_volume: bool = False
     without: tuple[tuple[str, "Law"], ...] = ()
     omits: tuple[str, ...] = ()
     alternatives: tuple[Alternative, ...] = ()

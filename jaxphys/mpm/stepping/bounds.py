@@ -28,6 +28,10 @@ SOUND: dict[KernelName, tuple[float, float]] = {
     "cubic": (1.13, 1.39),
 }
 DEFAULT = Transfer()
+# Share of the step that sound allows where stress follows the mean volume of the step before: what
+# of a wave the mean does not see, 1 - a, is damped by W (1 - a) a step, W = (w dt)^2, and must not
+# be by more than 2: W < 4 / (2 - a), against 4 where a = 1.
+LAGGED = math.sqrt(0.5)
 
 
 class StepBounds(NamedTuple):
@@ -217,7 +221,8 @@ def present_bounds(
     present = moduli_of(law, parameters, F)
     # F F^T does not tell the moduli of a state that has lost its stiffness from those at rest.
     largest = map(jnp.maximum, present, rest_moduli(law, parameters, density))
-    lengths = sound_length(transfer, spacing), lone_length(transfer, spacing)
+    sound = sound_length(transfer, spacing) * (LAGGED if law.shares_volume else 1)
+    lengths = sound, lone_length(transfer, spacing)
     first, second = (
         _step_of(length, density, modulus) for length, modulus in zip(lengths, largest, strict=True)
     )

@@ -98,8 +98,3 @@ class Transfer(Checked):
     def keeps_velocity(self) -> bool:
         """Whether a particle has a velocity that the grid does not, from one step to the next."""
         return self.scheme.blend > 0
-
-    @property
-    def columns(self) -> int:
-        """Numbers of a node: momentum and mass, and what momentum was before forces acted."""
-        return 8 if self.keeps_velocity else 4

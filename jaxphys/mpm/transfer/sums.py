@@ -8,8 +8,9 @@ With weight w and distance d = x_i - x_p:
 The transpose of the first is the second and the other way round; derivatives by x_p go through w
 and d. Automatic differentiation would store 27 of everything and turn every gather into a scatter.
 
-Vectors have three numbers, or six where a scheme needs two fields: momentum, and what it was before
-forces acted. Of the grid they are columns 0 to 2 and 4 to 6; column 3 is mass, column 7 void.
+Vectors have three numbers of momentum, and up to four more of what else is shared by mass: what
+momentum was before forces acted (three, where a scheme needs two fields), what volume changed by
+(one). Of the grid they are columns 0 to 2 and 4 to 7, as far as there are any; column 3 is mass.
 
 Layout: rows of four or eight numbers, one per node and, inside the transfers, one per particle, so
 that a node's row is read, scaled and added as one short vector. A loop over the planes of the
@@ -23,22 +24,22 @@ from jax import Array
 
 from jaxphys.mpm.transfer.stencil import Stencil, Window
 
-COLUMN = (0, 1, 2, 4, 5, 6)  # of each number of a vector
+COLUMN = (0, 1, 2, 4, 5, 6, 7)  # of each number of a vector
 
 
 def scatter(
     window: Window, at: Stencil, rows: Array, mass: Array | None, momentum: Array, affine: Array
 ) -> Array:
     """`rows` and what particles give to them: momentum [kg m/s] and mass [kg] of nodes (M, 4), or
-    (M, 8) of two fields.
+    (M, 8) where vectors have more than three numbers.
 
     Args:
         window: whose nodes the rows are, x slowest.
         at: the particles' stencils in it.
         rows: (M, 4) or (M, 8) to add to.
         mass: (N,) [kg], or None for zero.
-        momentum: (3, N) or (6, N) [kg m/s], the value at the particle.
-        affine: (3, 3, N) or (6, 3, N) [kg/s], what momentum changes by per metre: with quadratic
+        momentum: (3, N) [kg m/s], the value at the particle, or (V, N) with V up to 7.
+        affine: (3, 3, N) or (V, 3, N) [kg/s], what momentum changes by per metre: with quadratic
             splines m C - dt V 4/dx^2 tau for MLS-MPM (Hu et al. 2018, eq. 29).
     """
     width = window.kernel.width
@@ -70,7 +71,7 @@ def scatter_tangent(
 
 def gather(window: Window, at: Stencil, rows: Array) -> tuple[Array, Array]:
     """Sums of w g (4, N), and of w g d^T for the vector in it (3, 3, N), of rows g (M, 4); of rows
-    (M, 8) they are (8, N) and (6, 3, N).
+    (M, 8) they are (8, N) and (7, 3, N), whatever of them is used.
 
     Of velocities [m/s] these are the particle's and its first moment B [m^2/s]; C = 4 / dx^2 B with
     quadratic splines (Jiang et al. 2015).
@@ -119,25 +120,27 @@ def scatter_transpose(
         (no_sums, no_slopes),
     )
     sums, moments = _particle_last(sums, moments)
-    return _through_position(slopes, affine, sums, COLUMN), sums[3], vectors_of(sums), moments
+    count = len(momentum)
+    to_position = _through_position(slopes, affine, sums, COLUMN)
+    return to_position, sums[3], vectors_of(sums)[:count], moments[:count]
 
 
 def gather_slopes(
     window: Window, at: Stencil, rows: Array, vectors: Array, velocity: Array, moment: Array
 ) -> Array:
-    """Cotangent (3, N) of position of `gather`, from those of velocity (3, N) or (6, N) and moment
-    (3, 3, N) or (6, 3, N).
+    """Cotangent (3, N) of position of `gather`, from those of its vector, velocity first, (V, N),
+    and moment (V, 3, N).
 
-    rows: what was gathered from; vectors: those of the sums that `gather` gave. The cotangent of
-    the rows is `scatter` of the same two.
+    rows: what was gathered from; vectors: those of the sums that `gather` gave, at least as many.
+    The cotangent of the rows is `scatter` of the same two.
     """
     slopes = _over_planes(window, at, rows, *_slope_terms(window, at, None, velocity, moment))
     return _through_position(slopes, moment, vectors, range(len(moment)))
 
 
 def vectors_of(sums: Array) -> Array:
-    """The vectors (3, N) or (6, N) in sums (4, N) or (8, N)."""
-    return sums[:3] if len(sums) == 4 else jnp.concatenate([sums[:3], sums[4:7]])
+    """The vectors (3, N) or (7, N) in sums (4, N) or (8, N)."""
+    return sums[:3] if len(sums) == 4 else jnp.concatenate([sums[:3], sums[4:]])
 
 
 def _moved(at, moved):
@@ -181,11 +184,11 @@ def _add_planes(window, at, rows, gifts):
 
 
 def _rows(vectors: Array, last: Array | None = None) -> Array:
-    """Rows (N, 4) from (3, N) and a fourth column, 0 by default; (N, 8) from (6, N)."""
+    """Rows (N, 4) from (3, N) and a fourth column, 0 by default; (N, 8) from more than three."""
     last = jnp.zeros_like(vectors[0]) if last is None else last
     if len(vectors) == 3:
         return jnp.concatenate([vectors, last[None]]).T
-    void = jnp.zeros_like(vectors[:1])
+    void = jnp.zeros((len(COLUMN) - len(vectors), *vectors.shape[1:]), vectors.dtype)
     return jnp.concatenate([vectors[:3], last[None], vectors[3:], void]).T
 
 
@@ -252,7 +255,7 @@ def _slope_terms(window, at, mass, momentum, affine):
 
 
 def _particle_last(sums, moments):
-    """(4, N) or (8, N), and (3, 3, N) or (6, 3, N) of the vectors, from rows."""
+    """(4, N) or (8, N), and (3, 3, N) or (7, 3, N) of the vectors, from rows."""
     return sums.T, jnp.stack([vectors_of(moment.T) for moment in moments], axis=1)
 
 

@@ -31,5 +31,5 @@ def test_particles_that_breathe_against_each_other_share_one_pressure():
 
 
 def test_only_of_what_is_elastic():
-    with pytest.raises(InputError, match="von Mises is no elastic law"):
+    with pytest.raises(InputError, match="the law 'von Mises' flows or remembers"):
         at_mean_volume(VON_MISES)

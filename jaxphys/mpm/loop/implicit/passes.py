@@ -381,7 +381,7 @@ def finish(
         shared, matter, before = start.shared, rest.matter, rest.particles
         place = before.position
         flow = Flow(*to_particles(window, start.origin, place, velocities))
-        after, residual, flow = move(config, shared, matter, before, residual, flow, False)
+        after, residual, flow = move(config, law, shared, matter, before, residual, flow, False)
         code = failure(
             config,
             start.origin,
