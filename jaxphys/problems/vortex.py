@@ -108,21 +108,26 @@ def profile(R: Array) -> tuple[Array, Array, Array]:
     )
 
 
-def annulus_points(spacing: float) -> tuple[np.ndarray, np.ndarray]:
+def rings(inner: float, outer: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, 3) [m] on rings half a cell apart, as far from each other, and their areas (N,).
 
-    The rings fill the annulus exactly; a square lattice would leave its edges ragged.
+    The rings fill what lies between both radii exactly; a square lattice would leave ragged edges.
     """
-    rings = round(2 * (OUTER - INNER) / spacing)
-    width = (OUTER - INNER) / rings
+    number = round(2 * (outer - inner) / spacing)
+    width = (outer - inner) / number
     points, areas = [], []
-    for ring in range(rings):
-        R = INNER + width * (ring + 0.5)
+    for ring in range(number):
+        R = inner + width * (ring + 0.5)
         count = round(2 * np.pi * R / width)
         angle = 2 * np.pi * (np.arange(count) + 0.5 * (ring % 2)) / count
         points.append(np.stack([R * np.cos(angle), R * np.sin(angle), 0 * angle], axis=1))
         areas.append(np.full(count, 2 * np.pi * R * width / count))
     return np.concatenate(points), np.concatenate(areas)
+
+
+def annulus_points(spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """`rings` that fill the annulus."""
+    return rings(INNER, OUTER, spacing)
 
 
 def plate_points(side: float, cells: int) -> np.ndarray:
