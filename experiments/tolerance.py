@@ -48,7 +48,7 @@ MATERIALS = {
     "fracture": {"fracture_strain": (0.05, 0.1)},
 }
 SHAPES = ("ball", "block", "egg", "peanut")
-BOUNDARIES = ("rough floor", "slippery floor", "slope", "none")
+BOUNDARIES = (*3 * ("rough floor", "slope"), *2 * ("slippery floor",), "none")
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,9 @@ def drawn(seed: int = 15) -> list[Drawn]:
     """All scenes."""
     random = np.random.default_rng(seed)
     found = []
+    boundaries = random.permutation(BOUNDARIES)
     for group in range(GROUPS):
-        shape, boundary = random.choice(SHAPES), random.choice(BOUNDARIES)
+        shape, boundary = random.choice(SHAPES), boundaries[group]
         material = list(MATERIALS)[group % len(MATERIALS)]
         for number in range(SCENES):
             parameters = {
@@ -115,8 +116,9 @@ def shape_of(name: str, count: int = SPLATS) -> Gaussians:
 def scene_of(what: Drawn) -> Scene:
     """The scene of a draw: a third of a second of an object that falls."""
     normal = (0.35, 0.0, 1.0) if what.boundary == "slope" else (0.0, 0.0, 1.0)
-    # A slope reaches higher at the object's edge than in the middle.
-    rise = SIZE / 2 * math.hypot(*normal) if what.boundary == "slope" else SIZE / 2
+    # How far above the floor's height the middle is where the object touches it.
+    support = sum(normal) if what.shape == "block" else math.hypot(*normal)
+    rise = SIZE / 2 * support
     thing = Object(
         material=what.material,
         parameters=what.parameters,

@@ -20,8 +20,9 @@ import numpy as np
 from jaxphys.core.errors import InputError
 
 LEAST_ORDER, MOST_ORDER = 0.5, 3.0
-# Beyond the order of the method an observed one is luck on grids that are too coarse.
-TRUSTED_ORDER = 2.0
+# Contact is first order, the bulk second: an observed order beyond these is that of grids that are
+# still too coarse, and extrapolating with it would be worse.
+TRUSTED = (1.0, 2.0)
 # Cosine between the two differences below which they have nothing to do with each other.
 LEAST_ALIGNMENT = 0.3
 ROUNDING = 1e-5  # relative differences that float32 makes by itself (docs/benchmarks/tolerance.md)
@@ -53,8 +54,8 @@ class Convergence:
 
     @property
     def trusted_order(self) -> float:
-        """What is extrapolated with: the observed order, but no more than the method's."""
-        return min(self.order, TRUSTED_ORDER)
+        """What is extrapolated with: the observed order, kept to those of the method's parts."""
+        return trusted(self.order)
 
     def error_at(self, spacing: float) -> float:
         """Expected relative error on a grid of `spacing` [m]."""
@@ -63,6 +64,11 @@ class Convergence:
     def spacing_for(self, error: float) -> float:
         """The spacing [m] whose expected relative error this is."""
         return self.spacings[-1] * (error / self.error) ** (1 / self.trusted_order)
+
+
+def trusted(order: float) -> float:
+    """An observed order, kept to those of the method's parts."""
+    return min(max(order, TRUSTED[0]), TRUSTED[1])
 
 
 def root_mean_square(motion: np.ndarray) -> float:
@@ -108,7 +114,7 @@ def convergence(spacings: Sequence[float], motions: Sequence[np.ndarray]) -> Con
     large, small = root_mean_square(before) / scale, root_mean_square(after) / scale
     if small < ROUNDING:
         # Equal but for rounding: whatever the order, no finer grid changes what is seen.
-        return Convergence((coarse, middle, fine), TRUSTED_ORDER, 1.0, small, ROUNDING, scale)
+        return Convergence((coarse, middle, fine), TRUSTED[1], 1.0, small, ROUNDING, scale)
     alignment = float(np.mean(np.sum(before * after, axis=-1))) / (large * small * scale**2)
     order = math.log(large / small) / math.log(ratio)
     found = (
@@ -125,5 +131,5 @@ def convergence(spacings: Sequence[float], motions: Sequence[np.ndarray]) -> Con
             f"tolerance: no order shows: {found}, in different directions (cosine "
             f"{alignment:.2f}); a finer spacing or a shorter film may show one"
         )
-    error = small / (ratio ** min(order, TRUSTED_ORDER) - 1)
+    error = small / (ratio ** trusted(order) - 1)
     return Convergence((coarse, middle, fine), order, alignment, small, error, scale)

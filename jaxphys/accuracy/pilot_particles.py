@@ -13,7 +13,7 @@ import numpy as np
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.scene.place import Placed
 
-GREY = (0.5, 0.5, 0.5)
+GREY = np.full(3, 0.5)
 
 
 class Coarse(NamedTuple):

@@ -64,7 +64,8 @@ def pace(simulation: Simulation, budget: float = BUDGET) -> Pace:
 
     spent, taken = steps_taken(FEW)
     wanted = max(FEW, int(budget / MOST_CALLS / (spent / taken)))
-    samples, total, count = [], spent, taken
+    samples: list[float] = []
+    total, count = spent, taken
     while len(samples) < MOST_CALLS and (total < budget or not samples):
         spent, taken = steps_taken(wanted)
         samples.append(spent / taken)

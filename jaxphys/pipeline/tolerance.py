@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jaxphys.accuracy.choice import Choice, choose
@@ -97,7 +97,7 @@ def plan_for(scene: Scene, objects: tuple[Gaussians, ...], tolerance: float) -> 
     """
     if not LEAST <= tolerance <= MOST:
         raise InputError(f"tolerance: {tolerance:g}; give a relative error, {LEAST:g} to {MOST:g}")
-    if tolerance < SINGLE and not jax.config.jax_enable_x64:
+    if tolerance < SINGLE and jnp.result_type(float) != jnp.float64:
         raise InputError(
             f"tolerance: {tolerance:g} is less than float32 is good for; set JAX_ENABLE_X64=1"
         )

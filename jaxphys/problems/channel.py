@@ -3,7 +3,8 @@
 Half of the channel, from a wall at x = 0 that holds the fluid to the middle at x = h, where a free
 surface bears no shear, as symmetry asks. The flow is along y and the same at every y, so that one
 line of particles across the channel holds it, as long as it moves by much less than a cell: all
-forces here are small, and both problems scale.
+forces here are small, and both problems scale. Nothing moves across the channel, which is imposed,
+for the line has no neighbours whose shear would balance its own.
 
 Newton's fluid under a body acceleration G that begins at t = 0 (Batchelor 1967, section 4.3):
 u = G / (2 nu) x (2 h - x) - sum_k A_k sin(k x) exp(-nu k^2 t), k = (n + 1/2) pi / h,
@@ -21,7 +22,7 @@ from jax import Array
 from jaxphys.mpm.materials.fluid import FLUID
 from jaxphys.mpm.materials.viscoplasticity import HERSCHEL_BULKLEY
 from jaxphys.problems.bar import line_points
-from jaxphys.problems.discrete import Discretisation, discretise, held_up_to, steps_for
+from jaxphys.problems.discrete import Discretisation, Planar, discretise, held_up_to, steps_for
 from jaxphys.problems.problem import Problem
 
 TERMS = 40
@@ -152,7 +153,7 @@ def _across(truth, law, cells, spacing, speed, parameters, scale, dtype) -> Disc
         steps=steps,
         scale=scale,
         gravity=(0.0, truth.push, 0.0),
-        boundaries=(held_up_to(3.0, dtype),),
+        boundaries=(held_up_to(3.0, dtype), Planar(0)),
         dtype=dtype,
     )
 

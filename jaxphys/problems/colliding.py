@@ -33,7 +33,7 @@ class Bars:
     """
 
     length: float = 1.0
-    speed: float = 0.01
+    speed: float = 0.1
     youngs: float = 1000.0
     density: float = 1000.0
 
@@ -45,7 +45,7 @@ class Bars:
     @property
     def duration(self) -> float:
         """Until long after they part [s]."""
-        return 4 * self.length / self.wave_speed
+        return 6 * self.length / self.wave_speed
 
     @property
     def parted(self) -> float:

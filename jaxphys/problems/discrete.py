@@ -207,8 +207,9 @@ def discretise(
     full = lambda value: jnp.full((room.particles,), value, dtype)  # noqa: E731
     volume = jnp.asarray(rest_volume, dtype)
     config = Config(Grid(room.nodes, 1.0), ((law, 0, room.particles),), transfer=transfer)
-    if parameters is None:
+    if poisson is not None:
         parameters = {"youngs_modulus": truth.youngs, "poisson_ratio": poisson}
+    assert parameters is not None  # every law has some
     # Stress over density is a speed squared: lengths in dx make it smaller by dx^2.
     stresses = {one.name for one in law.declared if one.unit.startswith("Pa")}
     start = x / spacing + jnp.asarray(origin, jnp.float64)
