@@ -155,10 +155,14 @@ def vortex(
     share: float = 1.0,
     room: Room | None = None,
     dtype=jnp.float64,
+    **more,
 ) -> Discretisation:
-    """One layer of particles in plane strain; `share` of the body force is applied."""
+    """One layer of particles in plane strain; `share` of the body force is applied.
+
+    more: as for `discretise`: transfer, staggered.
+    """
     points, areas = annulus_points(spacing)
-    return _planar(truth, points, areas, spacing, duration, courant, share, room, dtype)
+    return _planar(truth, points, areas, spacing, duration, courant, share, room, dtype, **more)
 
 
 def plate(
@@ -182,7 +186,9 @@ def plate(
     return _planar(truth, points, area, spacing, duration, courant, share, room, dtype)
 
 
-def _planar(truth, points, areas, spacing, duration, courant, share, room, dtype) -> Discretisation:
+def _planar(
+    truth, points, areas, spacing, duration, courant, share, room, dtype, **more
+) -> Discretisation:
     fastest = abs(truth.amplitude) * np.pi * truth.rate + abs(truth.spin) * OUTER
     dt, steps = steps_for(duration, courant, spacing, truth.wave_speed + fastest)
     middle = half_width(spacing) if room is None else room.nodes[0] // 2
@@ -204,6 +210,7 @@ def _planar(truth, points, areas, spacing, duration, courant, share, room, dtype
         boundaries=(force, Planar(2)),
         room=room,
         dtype=dtype,
+        **more,
     )
 
 
