@@ -108,6 +108,6 @@ SPINNING_DISC = Problem(
     ),
     ladder=(4, 8, 16),
     order=None,
-    floor=2e-3,
+    floor=5e-4,
     norm=_growth_error,
 )

@@ -5,6 +5,10 @@ In a channel, between smooth side walls, a column of height H and length L besid
 Sparks and Freundt 2005, Phys. Rev. E 72), 1.8 for glass beads (Lajeunesse, Monnier and Homsy 2005,
 Phys. Fluids 17), 2.2 in simulations with the mu(I) rheology (Lagree, Staron and Popinet 2011, J.
 Fluid Mech. 686). Their middle, 1.7, is the answer, and the distance to the others its floor.
+
+The grains' angle is that of the slope they lie at, which is plane strain; the law's is that of
+triaxial compression, where Drucker and Prager's cone is weaker: an angle b of the law is an angle a
+in plane strain with sin(a) = 2 sqrt(3) sin(b) / (3 - sin(b)).
 """
 
 from dataclasses import dataclass
@@ -31,7 +35,8 @@ class Grains:
 
     Attributes:
         aspect: a, height over length; length: L [m].
-        friction: of the grains, angle [degrees]; floor: Coulomb's coefficient of the floor.
+        friction: of the grains, angle in plane strain [degrees].
+        floor: Coulomb's coefficient of the floor.
         youngs: Young's modulus [Pa]; density: [kg/m^3]; gravity: [m/s^2].
     """
 
@@ -47,6 +52,12 @@ class Grains:
     def height(self) -> float:
         """H [m]."""
         return self.aspect * self.length
+
+    @property
+    def triaxial(self) -> float:
+        """The law's friction angle [degrees]."""
+        sine = np.sin(np.radians(self.friction))
+        return float(np.degrees(np.arcsin(3 * sine / (2 * 3**0.5 + sine))))
 
     @property
     def duration(self) -> float:
@@ -80,7 +91,7 @@ def grains(truth: Grains, cells: int, dtype=jnp.float64) -> Discretisation:
         parameters={
             "youngs_modulus": truth.youngs,
             "poisson_ratio": 0.3,
-            "friction_angle": truth.friction,
+            "friction_angle": truth.triaxial,
         },
         nodes=(reach + 8, 3, round(cells * truth.aspect) + 8),
         origin=(3.0, 1.0, 3.0),

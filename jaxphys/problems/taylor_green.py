@@ -93,5 +93,5 @@ TAYLOR_GREEN = Problem(
         TaylorGreen(speed=1e-5 if jnp.dtype(dtype) == jnp.float64 else 1e-3), cells, dtype=dtype
     ),
     ladder=(4, 8, 16, 32),
-    order=1,
+    order=2,
 )
