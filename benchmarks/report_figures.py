@@ -78,6 +78,9 @@ def draw_sheet(problems: dict[str, Methods], path: Path, name: Callable[[str], s
 
 def _draw_problem(axes, curves: Methods, look: dict) -> None:
     timed = {m: [line for line in ladder if "seconds" in line] for m, ladder in curves.items()}
+    if not any(timed.values()):
+        axes.text(0.5, 0.5, "no run came to an end", ha="center", fontsize=7)
+        return
     finite = [_error(x) for ladder in timed.values() for x in ladder if _error(x) < math.inf]
     rail = 3 * max(finite, default=1.0)
     for method, ladder in timed.items():

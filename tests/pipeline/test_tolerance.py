@@ -44,6 +44,7 @@ def coarse(monkeypatch):
     monkeypatch.setattr(pilots, "MOST_PILOTS", 3)
 
 
+@pytest.mark.slow
 def test_a_run_held_to_a_tolerance_says_what_it_expects_and_what_came(coarse, tmp_path):
     said = []
     out = animate(
