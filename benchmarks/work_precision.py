@@ -183,6 +183,7 @@ def prepare_peer(name: str, resolution: int) -> Prepared:
     case = {
         "position": np.asarray(state.position, np.float64).T,
         "velocity": np.asarray(state.velocity, np.float64).T,
+        "affine": np.moveaxis(np.asarray(state.affine, np.float64), -1, 0),
         "nodes": problem.config.grid.shape[0],
         "spacing": 1.0,
         "law": "neo-Hookean",

@@ -15,7 +15,15 @@ import numpy as np
 from jax import Array
 
 from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
-from jaxphys.problems.discrete import BodyForce, Discretisation, Planar, Room, discretise, steps_for
+from jaxphys.problems.discrete import (
+    DEFAULT,
+    BodyForce,
+    Discretisation,
+    Planar,
+    Room,
+    discretise,
+    steps_for,
+)
 from jaxphys.problems.problem import Problem
 
 INNER, OUTER = 0.75, 1.25
@@ -192,8 +200,9 @@ def _planar(
     fastest = abs(truth.amplitude) * np.pi * truth.rate + abs(truth.spin) * OUTER
     dt, steps = steps_for(duration, courant, spacing, truth.wave_speed + fastest)
     middle = half_width(spacing) if room is None else room.nodes[0] // 2
+    across = more.get("transfer", DEFAULT).spline.width
     # Off the nodes, so that no symmetry of the grid helps.
-    origin = jnp.array([middle + 0.1, middle - 0.3, 1.0])
+    origin = jnp.array([middle + 0.1, middle - 0.3, (across - 1) / 2])
     force = BodyForce(truth, origin, jnp.asarray(spacing), jnp.asarray(share))
     return discretise(
         truth,
@@ -201,7 +210,7 @@ def _planar(
         areas * spacing,
         law=NEO_HOOKEAN,
         poisson=truth.poisson,
-        nodes=(2 * middle + 2, 2 * middle + 2, 3),
+        nodes=(2 * middle + 2, 2 * middle + 2, across),
         origin=origin,
         spacing=spacing,
         dt=dt,
