@@ -7,8 +7,7 @@ Phys. Fluids 17), 2.2 in simulations with the mu(I) rheology (Lagree, Staron and
 Fluid Mech. 686). Their middle, 1.7, is the answer, and the distance to the others its floor.
 
 The grains' angle is that of the slope they lie at, which is plane strain; the law's is that of
-triaxial compression, where Drucker and Prager's cone is weaker: an angle b of the law is an angle a
-in plane strain with sin(a) = 2 sqrt(3) sin(b) / (3 - sin(b)).
+triaxial compression, where Drucker and Prager's cone is weaker.
 """
 
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.mpm.boundaries import Plane
-from jaxphys.mpm.materials.plasticity import DRUCKER_PRAGER
+from jaxphys.mpm.materials.plasticity import DRUCKER_PRAGER, triaxial_friction_angle
 from jaxphys.mpm.state import State
 from jaxphys.problems.discrete import Discretisation, Planar, discretise, node_wall, steps_for
 from jaxphys.problems.problem import Problem, relative_to
@@ -56,8 +55,7 @@ class Grains:
     @property
     def triaxial(self) -> float:
         """The law's friction angle [degrees]."""
-        sine = np.sin(np.radians(self.friction))
-        return float(np.degrees(np.arcsin(3 * sine / (2 * 3**0.5 + sine))))
+        return float(triaxial_friction_angle(np.asarray(self.friction)))
 
     @property
     def duration(self) -> float:
