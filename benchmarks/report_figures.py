@@ -32,6 +32,17 @@ def _error(line: dict) -> float:
     return error if good and error > 0 else math.inf
 
 
+def _few_ticks(axis) -> None:
+    """Ticks of a logarithmic axis in a small plot: powers of ten, or 1, 2 and 5 of few of them."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    low, high = axis.get_view_interval()
+    between = (1.0, 2.0, 5.0) if high < 40 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=between, numticks=6))
+    axis.set_minor_locator(NullLocator())
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
 def _tidy(axes) -> None:
     axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
@@ -104,6 +115,8 @@ def _draw_problem(axes, curves: Methods, look: dict) -> None:
         axes.axhline(max(floors), color="#888888", linestyle="--", linewidth=0.8)
     axes.set_xscale("log")
     axes.set_yscale("log")
+    _few_ticks(axes.xaxis)
+    _few_ticks(axes.yaxis)
 
 
 def _flat(run) -> list[float]:

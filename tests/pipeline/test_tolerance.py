@@ -12,7 +12,7 @@ from jaxphys.mpm.stepping import Implicit
 from jaxphys.pipeline import pilots, tolerance
 from jaxphys.pipeline.animate import animate
 from jaxphys.pipeline.pace import pace, programs
-from jaxphys.pipeline.plan import ball
+from jaxphys.pipeline.plan import ball, make_plan
 from jaxphys.scene import Domain, Object, Scene, read_scene
 from jaxphys.scene.build import build
 
@@ -57,6 +57,14 @@ def test_a_run_held_to_a_tolerance_says_what_it_expects_and_what_came(coarse, tm
     before, after = said
     assert "pilots on grids of" in before and "is expected" in before
     assert "within the tolerance" in after and "NOT" not in after
+
+
+@pytest.mark.slow
+def test_a_plan_is_of_the_grid_that_the_tolerance_asks_for(coarse):
+    said = []
+    plan = make_plan(spinning(), tolerance=0.2, tell=said.append)
+    assert plan.grid != spinning().domain.shape and len(said) == 1
+    assert f"{plan.particles} particles" in said[0]
 
 
 @pytest.mark.parametrize(
