@@ -1,4 +1,8 @@
-"""python -m benchmarks run SUITE --out FILE.jsonl [--quick]"""
+"""Runs benchmarks, and makes figures and tables of what they wrote.
+
+python -m benchmarks run SUITE --out FILE.jsonl [--quick] [--rounds N]
+python -m benchmarks report
+"""
 
 import argparse
 import json
@@ -17,6 +21,10 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     run.add_argument("suite", choices=[*worker.SUITES, "all"])
     run.add_argument("--out", type=Path, required=True)
     run.add_argument("--quick", action="store_true", help="small cases, under a minute a suite")
+    run.add_argument("--rounds", type=int, help="processes for each case, instead of the suite's")
+    report = commands.add_parser("report", help="rebuild docs/benchmarks from committed lines")
+    report.add_argument("--lines", type=Path, default=Path("benchmarks/lines"))
+    report.add_argument("--out", type=Path, default=Path("docs/benchmarks"))
     one = commands.add_parser("worker", help="measure one case in this process")
     one.add_argument("suite", choices=worker.SUITES)
     one.add_argument("case")
@@ -49,11 +57,16 @@ def main() -> None:
     if options.command == "worker":
         worker.main(options.suite, options.case, options.method, options.quick)
         return
+    if options.command == "report":
+        from benchmarks.report import write_report
+
+        write_report(options.lines, options.out)
+        return
     options.out.parent.mkdir(parents=True, exist_ok=True)
     suites = worker.SUITES if options.suite == "all" else (options.suite,)
     with options.out.open("a") as out:
         for suite in suites:
-            for line in run_suite(suite, options.quick):
+            for line in run_suite(suite, options.quick, options.rounds):
                 out.write(json.dumps(line) + "\n")
                 out.flush()
                 print(describe(line), file=sys.stderr)

@@ -88,9 +88,11 @@ def _compared(line: dict, other: dict, name: str, pairs: list[float]) -> dict:
     return {**identity, **other, name: statistics.median(pairs), **spread}
 
 
-def run_suite(suite: str, quick: bool) -> Iterator[dict]:
+def run_suite(suite: str, quick: bool, times: int | None = None) -> Iterator[dict]:
     """Lines of one suite: one per case and method, then one per peer and baseline. A suite of
     outcomes instead of times has `lines` of its own, from this process.
+
+    times: processes for each case; None: as the suite says, one if it is to be quick.
     """
     own = getattr(suite_module(suite), "lines", None)
     if own is not None:
@@ -99,7 +101,8 @@ def run_suite(suite: str, quick: bool) -> Iterator[dict]:
     for _, group in groupby(suite_cases(suite, quick), key=lambda case: case.name):
         cases = list(group)
         rounds: dict[str, list[dict]] = {case.method: [] for case in cases}
-        for turn in range(1 if quick else max(case.rounds for case in cases)):
+        usual = 1 if quick else max(case.rounds for case in cases)
+        for turn in range(usual if times is None else times):
             order = cases if turn % 2 == 0 else cases[::-1]
             for case in order:
                 load = os.getloadavg()[0]

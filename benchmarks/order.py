@@ -7,12 +7,14 @@ with the next coarser grid, and is null on the coarsest. See docs/validation.md 
 
 import math
 import time
+from itertools import pairwise
 
 import jax
 
 from benchmarks.case import Case, Prepared
 from jaxphys.problems.catalogue import PROBLEMS
 from jaxphys.problems.discrete import displacement_errors, solve
+from jaxphys.problems.problem import Problem, displacement_error
 
 EXPENSIVE = ("vortex", "cube")
 
@@ -48,12 +50,19 @@ def prepare(name: str, cells: int, dtype: str) -> Prepared:
     )
 
 
+def _has_an_order(problem: Problem) -> bool:
+    """Whether its error is a displacement's, of a known order, on grids each twice as fine."""
+    doubled = all(b == 2 * a for a, b in pairwise(problem.ladder))
+    known = problem.norm is displacement_error and problem.order is not None
+    # The other resolutions are no spacings.
+    return known and doubled and problem.resolution == "cells"
+
+
 def cases(quick: bool) -> list[Case]:
     """Every level of every ladder; `quick` takes the first three of the cheap ones."""
     chosen = []
     for name, problem in PROBLEMS.items():
-        # The other resolutions are no spacings.
-        if problem.resolution != "cells" or (quick and name in EXPENSIVE):
+        if not _has_an_order(problem) or (quick and name in EXPENSIVE):
             continue
         for cells in problem.ladder[:3] if quick else problem.ladder:
             for dtype in ("float64",) if quick else ("float64", "float32"):

@@ -2,15 +2,17 @@
 
 import importlib
 import json
+import os
 import platform
 import resource
 import statistics
+import subprocess
 import time
 from importlib import metadata
 
 SUITES = (
     *("mpm", "mpm-grad", "scaling", "render", "drawing", "headline", "order", "implicit"),
-    *("extreme", "leave-out"),
+    *("extreme", "leave-out", "work-precision"),
 )
 MINIMUM_CALLS = 3
 
@@ -34,6 +36,28 @@ def versions() -> dict[str, str]:
         except metadata.PackageNotFoundError:
             continue
     return found
+
+
+def machine() -> dict[str, object]:
+    """The processor, as its maker calls it, and how many cores there are."""
+    names = []
+    if os.path.exists("/proc/cpuinfo"):
+        with open("/proc/cpuinfo") as lines:
+            names = [line.split(":", 1)[1].strip() for line in lines if "model name" in line]
+    return {"processor": names[0] if names else platform.processor(), "cores": os.cpu_count()}
+
+
+def commit() -> str | None:
+    """What is measured: the commit, with a plus where files differ from it; None: unknown."""
+
+    def git(*words: str) -> str:
+        return subprocess.run(["git", *words], capture_output=True, text=True, check=True).stdout
+
+    try:
+        changed = git("status", "--porcelain", "--untracked-files=no").strip()
+        return git("rev-parse", "--short", "HEAD").strip() + ("+" if changed else "")
+    except (OSError, subprocess.CalledProcessError):
+        return None
 
 
 def timed(call) -> float:
@@ -69,6 +93,8 @@ def measure(suite: str, name: str, method: str, quick: bool) -> dict:
         "error": prepared.error() if prepared.error else None,
         "status": "ok",
         "versions": versions(),
+        "machine": machine(),
+        "commit": commit(),
         **prepared.extra,
     }
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .pipeline.frames import frames as frames
     from .pipeline.frames import simulate as simulate
     from .pipeline.generate import generate as generate
+    from .pipeline.tolerance import plan_for as plan_for
     from .render.camera import look_at as look_at
     from .render.camera import orbit as orbit
     from .render.renderer import render as render
@@ -71,6 +72,7 @@ _HOMES = {
     "frames": "pipeline.frames",
     "simulate": "pipeline.frames",
     "generate": "pipeline.generate",
+    "plan_for": "pipeline.tolerance",
     "look_at": "render.camera",
     "orbit": "render.camera",
     "render": "render.renderer",

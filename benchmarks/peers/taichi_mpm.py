@@ -30,6 +30,8 @@ def build(case: dict, threads: int = 2):
     grid_m = ti.field(ti.f32, (nodes,) * 3)
     x.from_numpy(case["position"].astype(np.float32))
     v.from_numpy(case["velocity"].astype(np.float32))
+    if "affine" in case:  # (N, 3, 3) [1/s]
+        C.from_numpy(np.ascontiguousarray(case["affine"], np.float32))
     F.from_numpy(np.broadcast_to(np.eye(3, dtype=np.float32), (count, 3, 3)).copy())
 
     @ti.kernel

@@ -2,6 +2,7 @@
 quick.
 """
 
+import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -176,6 +177,7 @@ def animate(
     stepping: Literal["adaptive", "fixed", "implicit"] | None = None,
     substep: float | None = None,
     unsafe_dt: bool = False,
+    tolerance: float | None = None,
     save_splats: bool = False,
     settings: Settings = (),
     quiet: bool = False,
@@ -201,6 +203,8 @@ def animate(
             stiff matter in slow motion (`jaxphys plan` says what pays). Default: adaptive.
         substep: Time step [s], which makes steps equal. Default: as large as is safe.
         unsafe_dt: Take --substep even if it is beyond what is stable.
+        tolerance: Relative error of the motion that is allowed, such as 0.03: pilots on coarse
+            grids say which grid that needs, or why nothing can be said.
         save_splats: Also write one .ply for each picture.
         settings: Any field of the scene by its path in the file, or a parameter or field of the
             first object for short, once or more: youngs_modulus=2e4, boundaries.0.friction=0.2.
@@ -228,6 +232,8 @@ def animate(
         overwrite=overwrite,
         inputs=files_read(config, source),
         progress=not quiet,
+        tolerance=tolerance,
+        tell=lambda line: print(line, file=sys.stderr),
     )
     tell(made, json)
     return 0
@@ -318,6 +324,8 @@ def plan(
     material: str | None = None,
     object: Path | None = None,
     settings: Settings = (),
+    tolerance: float | None = None,
+    measure: bool = True,
     json: bool = False,
 ) -> int:
     """Tell what a scene needs, what is left out of its program and why, the time step and its
@@ -330,6 +338,9 @@ def plan(
         material: Plan this material's own scene instead.
         object: The object to plan with; without it, a ball of the same size stands in.
         settings: As for animate.
+        tolerance: Plan the grid that this relative error of the motion needs, found by pilots on
+            coarse grids.
+        measure: Compile the programs and run each for a second, to tell the time they will take.
         json: Print JSON.
     """
     from jaxphys.cli.scenes import scene_for, with_source
@@ -339,7 +350,14 @@ def plan(
     config = scene / "config.json" if scene is not None and scene.is_dir() else scene
     asked = with_settings(scene_for(config, material, {}), settings)
     asked, beside = with_source(asked, object, config, None, required=False)
-    print(as_text(make_plan(asked, beside), as_json=json))
+    made = make_plan(
+        asked,
+        beside,
+        measure=measure,
+        tolerance=tolerance,
+        tell=lambda line: print(line, file=sys.stderr),
+    )
+    print(as_text(made, as_json=json))
     return 0
 
 

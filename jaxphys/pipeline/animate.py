@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxphys.core.checkpoints import fingerprint
-from jaxphys.core.files import aside_path, atomic_path
+from jaxphys.core.files import aside_path, atomic_path, write_json
 from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.core.run_folder import RunFolder, run_folder
 from jaxphys.gaussians.gaussians import Gaussians
@@ -23,6 +23,7 @@ from jaxphys.pipeline.record import Record, recorded
 from jaxphys.pipeline.resume import FOLDER, MotionCheckpoint
 from jaxphys.pipeline.tell import NAME as REPORT
 from jaxphys.pipeline.tell import report_of
+from jaxphys.pipeline.tolerance import TolerancePlan, after_text, as_json, before_text, plan_for
 from jaxphys.pipeline.video import write_picture
 from jaxphys.scene.build import build, validate
 from jaxphys.scene.json import to_json, write_scene
@@ -40,12 +41,14 @@ from jaxphys.scene.source import find, load_object
 Watch = Callable[[str, int], None]
 # What an unfinished run leaves, and a finished one takes away.
 UNFINISHED = ("motion.partial.mp4", "last_good.ply", "last_good.png", FOLDER)
+ACCURACY = "accuracy.json"
 MADE = (
     "config.json",
     "motion.mp4",
     "contact_sheet.png",
     "metrics.jsonl",
     "timing.json",
+    ACCURACY,
     REPORT,
 )
 
@@ -62,6 +65,8 @@ def animate(
     progress: bool = False,
     timing: Timing | None = None,
     watch: Watch | None = None,
+    tolerance: float | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> Path:
     """Simulates, draws and encodes a scene; returns the directory.
 
@@ -69,6 +74,9 @@ def animate(
     `motion.mp4`, `contact_sheet.png`, `metrics.jsonl`, `timing.json`, a `report.html` that shows
     and explains them, and with `save_splats` one `splats/NNNN.ply` a frame. An interrupted run
     leaves a checkpoint there, and the same call goes on.
+
+    With a `tolerance` pilots on coarse grids choose the grid, `config.json` has what they chose,
+    and `accuracy.json` the error that was expected and the estimate after the run.
 
     Args:
         scene: what is asked for.
@@ -81,6 +89,8 @@ def animate(
         progress: whether to show bars with the time left on standard error.
         timing: to add to; a new one if not given.
         watch: called as watch(stage, frame) after each frame; may raise KeyboardInterrupt.
+        tolerance: relative error of the motion that is allowed, see `pipeline.tolerance.plan_for`.
+        tell: gets a line before the run and one after it, where there is a tolerance.
 
     Raises:
         InputError: the scene or an object cannot be used, they do not fit into memory, or `out`
@@ -100,6 +110,13 @@ def animate(
             )
             inputs = (*inputs, *source_files(scene, beside))
     require_room(at_least(scene, sum(one.count for one in objects)), room())
+    held_to = None
+    if tolerance is not None:
+        with timing.stage("pilots"):
+            held_to = plan_for(scene, objects, tolerance)
+        scene = held_to.scene
+        if tell is not None:
+            tell(before_text(held_to))
     meshes = [mesh_file(scene, i) for i in mesh_obstacles(scene)]
     inputs = (*inputs, *meshes)
     written = _with_written_sources(scene)
@@ -115,6 +132,8 @@ def animate(
             progress=progress,
             timing=timing,
             watch=watch,
+            held_to=held_to,
+            tell=tell,
         )
 
 
@@ -140,14 +159,19 @@ def animate_in(
     timing: Timing,
     watch: Watch | None,
     prompt: Mapping[str, Any] | None = None,
+    held_to: TolerancePlan | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> Path:
     """As `animate`, into a folder in which the `products` of the scene are declared.
 
     Args:
         prompt: what the folder's prompt.json holds, for the report; None: there is none.
+        held_to: the plan that chose the scene's grid, None: there is no tolerance.
+        tell: gets the estimate of the error.
     """
     with timing.stage("build"):
-        simulation, look = built = build(scene, *objects)
+        built = build(scene, *objects) if held_to is None else held_to.built
+        simulation, look = built
     require_room(expected(scene, built), room())
     scene = _write_inputs(folder, scene, objects)
     identity = fingerprint(_text(scene), (simulation.model, simulation.state))
@@ -190,6 +214,11 @@ def animate_in(
             aside.unlink(missing_ok=True)
     sheet.write(folder.file("contact_sheet.png"))
     write_lines(folder.file("metrics.jsonl"), record.metrics)
+    if held_to is not None:
+        error = held_to.achieved(record.frames)
+        write_json(folder.file(ACCURACY), as_json(held_to, error))
+        if tell is not None:
+            tell(after_text(held_to, error))
     if save_splats:
         with timing.stage("splats"):
             for index, frame in enumerate(record.frames):

@@ -7,7 +7,6 @@ Film, checkpoint, metrics and whoever comes after consume the same iterator.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import islice
 
 import jax
@@ -98,6 +97,7 @@ def frames(
     start: tuple[int, State] | None = None,
     particles: Array | None = None,
     timing: Timing | None = None,
+    whole: bool = False,
 ) -> Iterator[Moment]:
     """Frame after frame without end; take as many as are wanted.
 
@@ -111,6 +111,8 @@ def frames(
         start: number and state of a frame to go on after; None: the first moment is frame 0.
         particles: those that frames hold, see `Simulation.frame`; None: all.
         timing: gets the seconds, those of compiling apart.
+        whole: compute all of the grid, in one program: for motions that take less time than it
+            takes to compile a window.
 
     Raises:
         SimulationError: names frame, particle and remedy; every moment before it was good.
@@ -122,7 +124,11 @@ def frames(
         yield _moment(simulation, simulation.state, 0, particles)
     number, state = start
     config, model = simulation.config, simulation.model
-    cut = partial(windowed, slabs=slabs_for(simulation.stepping))
+    slabs = slabs_for(simulation.stepping)
+
+    def cut(config: Config, state: State) -> Config:
+        return config if whole else windowed(config, state, slabs=slabs)
+
     if config.placement.devices > 1:
         # Where the frames leave it, so that the first one is no program of its own.
         model, state = jax.device_put((model, state), config.placement.everywhere())

@@ -6,7 +6,7 @@ picture of the very simulation that would run, and finds the marks.
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -32,19 +32,14 @@ from jaxphys.mpm.stepping.bounds import largest_stable_dt
 from jaxphys.mpm.stepping.choice import which_stepping
 from jaxphys.pipeline.film import drawn_at_once, picture, surroundings_of
 from jaxphys.pipeline.memory import expected, room
+from jaxphys.pipeline.pace import drawing_pace, pace
+from jaxphys.pipeline.tolerance import before_text, plan_for
 from jaxphys.render.camera import orbit
 from jaxphys.scene.build import Built, build
 from jaxphys.scene.obstacles import located
 from jaxphys.scene.place import rotation_matrix
 from jaxphys.scene.scene import Object, Scene
 from jaxphys.scene.source import load_object
-
-# Measured on two x86-64 cores with AVX-512, float32; for orientation only.
-PARTICLE_STEPS_A_SECOND = 2.2e6
-NODE_STEPS_A_SECOND = 2e8
-PIXELS_A_SECOND = 6e6
-SPLATS_A_SECOND = 4e5
-COMPILE_SECONDS = 12.0
 
 # Optional parts that any program may hold: why it does, and why not. Laws and boundaries, of which
 # there are more, say themselves what they are.
@@ -112,7 +107,8 @@ class Plan:
         steps_per_frame, frames, steps: counts, of fixed steps; those that adapt are not known
             before they are taken.
         memory: bytes at the peak, by what they hold; room: bytes that there are, if known.
-        seconds: estimate by stage, on two CPU cores.
+        seconds: estimate by stage, from a second of each on this machine (`measured`); None where
+            nobody measured.
     """
 
     included: dict[str, str]
@@ -135,8 +131,8 @@ class Plan:
     frames: int
     steps: int
     memory: dict[str, int]
-    room: int | None
-    seconds: dict[str, float]
+    room: int | None = None
+    seconds: dict[str, float] | None = None
 
 
 def ball(count: int = 4000) -> Gaussians:
@@ -179,12 +175,26 @@ def program_parts(scene: Scene, built: Built) -> dict[str, int]:
     return {name: found.get(name, 0) + shown.get(name, 0) for name in {**found, **shown}}
 
 
-def make_plan(scene: Scene, beside: Path | None = None) -> Plan:
+def make_plan(
+    scene: Scene,
+    beside: Path | None = None,
+    *,
+    measure: bool = False,
+    tolerance: float | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Plan:
     """The plan of a scene; a ball stands in for each object that has no source.
 
     Args:
         scene: to be planned.
         beside: where relative sources are looked up first.
+        measure: compile its programs and run each for a second, for the time it will take.
+        tolerance: plan the scene on the grid that this relative error of its motion asks for; takes
+            pilots, see `pipeline.tolerance`.
+        tell: gets what the pilots found, as a line.
+
+    Raises:
+        InputError: the scene cannot be built, or not be held to the tolerance.
     """
     objects = tuple(
         stand_in(thing, f"objects[{i}]")
@@ -193,7 +203,35 @@ def make_plan(scene: Scene, beside: Path | None = None) -> Plan:
         for i, thing in enumerate(scene.objects)
     )
     scene = located(scene, beside)
-    return describe(scene, build(scene, *objects))
+    if tolerance is None:
+        built = build(scene, *objects)
+    else:
+        chosen = plan_for(scene, objects, tolerance)
+        scene, built = chosen.scene, chosen.built
+        if tell is not None:
+            tell(before_text(chosen))
+    plan = replace(describe(scene, built), room=room())
+    return measured(scene, built, plan) if measure else plan
+
+
+def measured(scene: Scene, built: Built, plan: Plan) -> Plan:
+    """The plan with how long its run will take on this machine.
+
+    Steps that adapt are taken to be as many as equal ones, and the motion to stay in its first
+    window: pilots (`tolerance`) know better.
+    """
+    simulation, _ = built
+    stepping = pace(simulation)
+    compiled, a_picture = drawing_pace(scene, built)
+    count = simulation.steps * (scene.frames - 1)
+    if isinstance(simulation.stepping, Implicit):
+        count = plan.steps
+    seconds = {
+        "compile": stepping.compile + compiled,
+        "simulate": count * stepping.step,
+        "render": scene.frames * a_picture,
+    }
+    return replace(plan, seconds=seconds)
 
 
 def _facts(scene: Scene, built: Built) -> tuple[dict[str, str], dict[str, str]]:
@@ -240,13 +278,10 @@ def describe(scene: Scene, built: Built) -> Plan:
     placement = simulation.config.placement
     chunk = max(into.size for into in cuts(simulation.config.runs, placement))
     particles, drawn = simulation.config.particles, look.gaussians.count
-    nodes = int(np.prod(simulation.config.grid.shape))
-    advice, substep, a_frame, passes = _steps(simulation)
+    advice, substep, a_frame = _steps(simulation)
     steps = a_frame * (scene.frames - 1)
-    passes *= scene.frames - 1
     # What the scene has nothing of sets no bound.
     limits = {k: float(v) for k, v in bounds._asdict().items() if np.isfinite(v)}
-    pixels = scene.width * scene.height
     return Plan(
         included=included,
         left_out=left_out,
@@ -268,13 +303,6 @@ def describe(scene: Scene, built: Built) -> Plan:
         frames=scene.frames,
         steps=steps,
         memory=expected(scene, built),
-        room=room(),
-        seconds={
-            "compile": COMPILE_SECONDS,
-            "simulate": passes
-            * (particles / PARTICLE_STEPS_A_SECOND + nodes / NODE_STEPS_A_SECOND),
-            "render": scene.frames * (pixels / PIXELS_A_SECOND + drawn / SPLATS_A_SECOND),
-        },
     )
 
 
@@ -294,8 +322,8 @@ def _stepping_text(scene: Scene) -> str:
     return "fixed"
 
 
-def _steps(simulation: Simulation) -> tuple[str, float, int, float]:
-    """Which way is cheaper and why; the step [s], steps and passes over all particles a frame.
+def _steps(simulation: Simulation) -> tuple[str, float, int]:
+    """Which way is cheaper and why; the step [s], and steps a frame.
 
     Of implicit steps an estimate, from the speeds of the start.
     """
@@ -304,12 +332,12 @@ def _steps(simulation: Simulation) -> tuple[str, float, int, float]:
     try:
         check_implicit(replace(config, slabs=None), model)
     except InputError as error:
-        return f"explicit alone is possible ({error})", simulation.dt, steps, steps
+        return f"explicit alone is possible ({error})", simulation.dt, steps
     choice = which_stepping(config, model, state, simulation.frame_time)
     if not isinstance(simulation.stepping, Implicit):
-        return choice.reason, simulation.dt, steps, steps
+        return choice.reason, simulation.dt, steps
     count = max(1, math.ceil(simulation.frame_time / choice.length - 1e-9))
-    return choice.reason, simulation.frame_time / count, count, choice.implicit
+    return choice.reason, simulation.frame_time / count, count
 
 
 def shared(plan: Plan) -> str:
@@ -355,7 +383,10 @@ def as_text(plan: Plan, as_json: bool = False) -> str:
         *(f"  bound {name}: {value:.3e} s" for name, value in plan.bounds.items()),
         f"steps: {plan.steps_per_frame} a frame, {plan.frames} frames, {plan.steps} in all",
         memory_text(plan),
-        "time on two cores, roughly: "
-        + ", ".join(f"{name} {seconds:.0f} s" for name, seconds in plan.seconds.items()),
     ]
+    if plan.seconds is not None:
+        lines.append(
+            "time on this machine, roughly: "
+            + ", ".join(f"{name} {seconds:.1f} s" for name, seconds in plan.seconds.items())
+        )
     return "\n".join(lines)

@@ -102,6 +102,7 @@ def free_bar(
     room: Room | None = None,
     transfer: Transfer = DEFAULT,
     dtype=jnp.float64,
+    per_axis: int = 2,
 ) -> Discretisation:
     """The bar and its mirror image, free at both ends: no boundary condition is imposed.
 
@@ -109,7 +110,9 @@ def free_bar(
     line of nodes: the sums over the other two axes are exact, so that the problem is the
     one-dimensional one.
     """
-    return _line(bar, cells, cells, courant, periods, staggered, -1e5, room, transfer, dtype)
+    return _line(
+        bar, cells, cells, courant, periods, staggered, -1e5, room, transfer, dtype, per_axis
+    )
 
 
 def held_bar(
@@ -129,15 +132,15 @@ def held_bar(
 
 
 def _line(
-    bar, cells, mirrored, courant, periods, staggered, held, room, transfer, dtype
+    bar, cells, mirrored, courant, periods, staggered, held, room, transfer, dtype, per_axis=2
 ) -> Discretisation:
     spacing, width = bar.length / cells, transfer.spline.width
     middle = (width - 1) / 2  # of the nodes across
     dt, steps = steps_for(periods * bar.period, courant, spacing, bar.wave_speed)
     return discretise(
         bar,
-        line_points(-mirrored * spacing, cells + mirrored, spacing),
-        spacing**3 / 2,
+        line_points(-mirrored * spacing, cells + mirrored, spacing, per_axis),
+        spacing**3 / per_axis,
         law=HENCKY,
         poisson=0.0,
         nodes=(cells + mirrored + 7, width, width),

@@ -1,9 +1,20 @@
 """All problems by name."""
 
 from jaxphys.problems.bar import FREE_BAR, HELD_BAR
+from jaxphys.problems.cantilever import CANTILEVER
+from jaxphys.problems.channel import BINGHAM, POISEUILLE
+from jaxphys.problems.colliding import COLLIDING_BARS
 from jaxphys.problems.column import SUDDEN_COLUMN
 from jaxphys.problems.cube import FREE_CUBE
+from jaxphys.problems.dam import DAM_BREAK
+from jaxphys.problems.disc import SPINNING_DISC
+from jaxphys.problems.granular import LOW_COLUMN, TALL_COLUMN
+from jaxphys.problems.hertz import HERTZ_IMPACT
+from jaxphys.problems.incline import SLIDING_BLOCK, STICKING_BLOCK
 from jaxphys.problems.particle import BREATHING_PARTICLE
+from jaxphys.problems.ringing import RINGING_CUBE
+from jaxphys.problems.taylor_bar import TAYLOR_BAR
+from jaxphys.problems.taylor_green import TAYLOR_GREEN
 from jaxphys.problems.vortex import RIGID_ROTATION, VORTEX
 
 PROBLEMS = {
@@ -16,5 +27,19 @@ PROBLEMS = {
         RIGID_ROTATION,
         VORTEX,
         FREE_CUBE,
+        RINGING_CUBE,
+        CANTILEVER,
+        COLLIDING_BARS,
+        SPINNING_DISC,
+        SLIDING_BLOCK,
+        STICKING_BLOCK,
+        HERTZ_IMPACT,
+        TAYLOR_BAR,
+        POISEUILLE,
+        BINGHAM,
+        TAYLOR_GREEN,
+        DAM_BREAK,
+        LOW_COLUMN,
+        TALL_COLUMN,
     )
 }

@@ -7,6 +7,7 @@ Velocities start at t = -dt/2: the step is v <- v + dt a(x), x <- x + dt v, whic
 scheme, second order in dt, when v is read as the velocity half a step before x.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, ClassVar, NamedTuple
@@ -19,6 +20,7 @@ from jax import Array
 from jaxphys.core import algebra
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.boundaries import Boundary, Plane, Setting
+from jaxphys.mpm.boundaries.contact import Surface
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.materials.law import Law
@@ -51,6 +53,7 @@ class Discretisation:
         spacing: dx of the grid [m].
         scale: the displacement [m] that errors are relative to.
         count: how many particles are the problem's.
+        origin: (3,) where the truth's origin sits on the grid [dx].
     """
 
     truth: Any
@@ -63,6 +66,17 @@ class Discretisation:
     spacing: float
     scale: float
     count: int
+    origin: Array
+
+    def places(self, state: State) -> np.ndarray:
+        """Where the problem's particles are, (3, N) [m] from the truth's origin."""
+        x = np.asarray(state.position, np.float64)[:, : self.count]
+        return self.spacing * (x - np.asarray(self.origin)[:, None])
+
+    @property
+    def volumes(self) -> np.ndarray:
+        """Rest volumes of the problem's particles, (N,) [m^3]."""
+        return self.spacing**3 * np.asarray(self.model.volume, np.float64)[: self.count]
 
 
 @jax.tree_util.register_dataclass
@@ -104,8 +118,22 @@ class Planar(Boundary):
 
 def held_up_to(coordinate: float, dtype) -> Plane:
     """Holds all nodes with x up to `coordinate` [dx]; a large negative one holds none."""
+    return node_wall(0, coordinate, 1, "sticky", dtype)
+
+
+def node_wall(axis: int, coordinate: float, side: int, surface: Surface, dtype) -> Plane:
+    """A wall of nodes: those on `axis` up to `coordinate` [dx] (side 1), or from it on (-1)."""
+    point, normal = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+    point[axis], normal[axis] = coordinate + 0.25 * side, float(side)
     setting = Setting(Grid((3, 3, 3), 1.0), np.zeros((0, 3)), np.zeros(0), dtype)
-    return Plane((coordinate + 0.25, 0.0, 0.0), (1.0, 0.0, 0.0), "sticky").prepared(setting)
+    plane = Plane(
+        (point[0], point[1], point[2]),
+        (normal[0], normal[1], normal[2]),
+        surface,
+        friction=None,
+        acts_on="nodes",
+    )
+    return plane.prepared(setting)
 
 
 def steps_for(duration: float, courant: float, spacing: float, speed: float) -> tuple[float, int]:
@@ -135,7 +163,7 @@ def discretise(
     volume,
     *,
     law: Law,
-    poisson: float,
+    poisson: float | None = None,
     nodes: tuple[int, int, int],
     origin,
     spacing: float,
@@ -144,6 +172,8 @@ def discretise(
     scale: float,
     gravity=(0.0, 0.0, 0.0),
     boundaries: tuple = (),
+    contacts: tuple = (),
+    parameters: Mapping[str, float] | None = None,
     staggered: bool = True,
     room: Room | None = None,
     transfer: Transfer = DEFAULT,
@@ -152,11 +182,13 @@ def discretise(
     """Particles at `points` (N, 3) [m] with rest `volume` (N,) or () [m^3] that start on a motion.
 
     Args:
-        truth: a pytree with `motion`, `youngs` [Pa] and `density` [kg/m^3].
+        truth: a pytree with `motion`, `density` [kg/m^3] and, with `poisson`, `youngs` [Pa].
+        poisson: of an elastic law; parameters: of any other law, by name, in SI units.
         nodes: of the grid; `room` may give more; transfer: see `Config`.
         origin: (3,) where the motion's origin sits on the grid [dx].
         spacing: dx [m]; scale: see `Discretisation`; gravity: [m/s^2].
-        boundaries: in units of dx.
+        boundaries: in units of dx, prepared; contacts: likewise, still to be prepared for the
+            particles that they touch.
         staggered: whether velocities start at -dt/2 rather than at 0.
     """
     count = len(points)
@@ -175,21 +207,30 @@ def discretise(
     full = lambda value: jnp.full((room.particles,), value, dtype)  # noqa: E731
     volume = jnp.asarray(rest_volume, dtype)
     config = Config(Grid(room.nodes, 1.0), ((law, 0, room.particles),), transfer=transfer)
+    if poisson is not None:
+        parameters = {"youngs_modulus": truth.youngs, "poisson_ratio": poisson}
+    assert parameters is not None  # every law has some
+    # Stress over density is a speed squared: lengths in dx make it smaller by dx^2.
+    stresses = {one.name for one in law.declared if one.unit.startswith("Pa")}
+    start = x / spacing + jnp.asarray(origin, jnp.float64)
+    setting = Setting(config.grid, np.asarray(start), rest_volume, jnp.dtype(dtype))
+    boundaries = (*boundaries, *(contact.prepared(setting) for contact in contacts))
     model = Model(
         mass=volume * truth.density,
         volume=volume,
-        # Stress over density is a speed squared: lengths in dx make it smaller by dx^2.
         parameters={
-            "youngs_modulus": full(truth.youngs / spacing**2),
-            "poisson_ratio": full(poisson),
+            name: full(value / spacing**2 if name in stresses else value)
+            for name, value in parameters.items()
         },
         gravity=jnp.asarray(gravity, dtype) / spacing,
         boundaries=boundaries,
     )
     origin = jnp.asarray(origin, jnp.float64)
-    state = initial_state(config, x / spacing + origin, v / spacing, F, affine, dtype=dtype)
+    state = initial_state(config, start, v / spacing, F, affine, dtype=dtype, boundaries=boundaries)
     exact = (exact / spacing + origin).T
-    return Discretisation(truth, config, model, state, dt, steps, exact, spacing, scale, count)
+    return Discretisation(
+        truth, config, model, state, dt, steps, exact, spacing, scale, count, origin
+    )
 
 
 @partial(jax.jit, static_argnums=0)

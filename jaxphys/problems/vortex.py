@@ -15,7 +15,15 @@ import numpy as np
 from jax import Array
 
 from jaxphys.mpm.materials.elasticity import NEO_HOOKEAN
-from jaxphys.problems.discrete import BodyForce, Discretisation, Planar, Room, discretise, steps_for
+from jaxphys.problems.discrete import (
+    DEFAULT,
+    BodyForce,
+    Discretisation,
+    Planar,
+    Room,
+    discretise,
+    steps_for,
+)
 from jaxphys.problems.problem import Problem
 
 INNER, OUTER = 0.75, 1.25
@@ -108,21 +116,26 @@ def profile(R: Array) -> tuple[Array, Array, Array]:
     )
 
 
-def annulus_points(spacing: float) -> tuple[np.ndarray, np.ndarray]:
+def rings(inner: float, outer: float, spacing: float) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, 3) [m] on rings half a cell apart, as far from each other, and their areas (N,).
 
-    The rings fill the annulus exactly; a square lattice would leave its edges ragged.
+    The rings fill what lies between both radii exactly; a square lattice would leave ragged edges.
     """
-    rings = round(2 * (OUTER - INNER) / spacing)
-    width = (OUTER - INNER) / rings
+    number = round(2 * (outer - inner) / spacing)
+    width = (outer - inner) / number
     points, areas = [], []
-    for ring in range(rings):
-        R = INNER + width * (ring + 0.5)
+    for ring in range(number):
+        R = inner + width * (ring + 0.5)
         count = round(2 * np.pi * R / width)
         angle = 2 * np.pi * (np.arange(count) + 0.5 * (ring % 2)) / count
         points.append(np.stack([R * np.cos(angle), R * np.sin(angle), 0 * angle], axis=1))
         areas.append(np.full(count, 2 * np.pi * R * width / count))
     return np.concatenate(points), np.concatenate(areas)
+
+
+def annulus_points(spacing: float) -> tuple[np.ndarray, np.ndarray]:
+    """`rings` that fill the annulus."""
+    return rings(INNER, OUTER, spacing)
 
 
 def plate_points(side: float, cells: int) -> np.ndarray:
@@ -150,10 +163,14 @@ def vortex(
     share: float = 1.0,
     room: Room | None = None,
     dtype=jnp.float64,
+    **more,
 ) -> Discretisation:
-    """One layer of particles in plane strain; `share` of the body force is applied."""
+    """One layer of particles in plane strain; `share` of the body force is applied.
+
+    more: as for `discretise`: transfer, staggered.
+    """
     points, areas = annulus_points(spacing)
-    return _planar(truth, points, areas, spacing, duration, courant, share, room, dtype)
+    return _planar(truth, points, areas, spacing, duration, courant, share, room, dtype, **more)
 
 
 def plate(
@@ -177,12 +194,15 @@ def plate(
     return _planar(truth, points, area, spacing, duration, courant, share, room, dtype)
 
 
-def _planar(truth, points, areas, spacing, duration, courant, share, room, dtype) -> Discretisation:
+def _planar(
+    truth, points, areas, spacing, duration, courant, share, room, dtype, **more
+) -> Discretisation:
     fastest = abs(truth.amplitude) * np.pi * truth.rate + abs(truth.spin) * OUTER
     dt, steps = steps_for(duration, courant, spacing, truth.wave_speed + fastest)
     middle = half_width(spacing) if room is None else room.nodes[0] // 2
+    across = more.get("transfer", DEFAULT).spline.width
     # Off the nodes, so that no symmetry of the grid helps.
-    origin = jnp.array([middle + 0.1, middle - 0.3, 1.0])
+    origin = jnp.array([middle + 0.1, middle - 0.3, (across - 1) / 2])
     force = BodyForce(truth, origin, jnp.asarray(spacing), jnp.asarray(share))
     return discretise(
         truth,
@@ -190,7 +210,7 @@ def _planar(truth, points, areas, spacing, duration, courant, share, room, dtype
         areas * spacing,
         law=NEO_HOOKEAN,
         poisson=truth.poisson,
-        nodes=(2 * middle + 2, 2 * middle + 2, 3),
+        nodes=(2 * middle + 2, 2 * middle + 2, across),
         origin=origin,
         spacing=spacing,
         dt=dt,
@@ -199,6 +219,7 @@ def _planar(truth, points, areas, spacing, duration, courant, share, room, dtype
         boundaries=(force, Planar(2)),
         room=room,
         dtype=dtype,
+        **more,
     )
 
 

@@ -21,7 +21,7 @@ FLAGS = {
     "animate": {
         "--material": TEXT, "--config": "file", "--seed": NUMBER, "--width": NUMBER,
         "--height": NUMBER, "--frames": NUMBER, "--splats": NUMBER, "--substep": NUMBER,
-        "--unsafe-dt": None, "--save-splats": None,
+        "--unsafe-dt": None, "--save-splats": None, "--tolerance": NUMBER,
     },
     "splat": {"--count": NUMBER, "--seed": NUMBER},
     "render": {
@@ -31,7 +31,8 @@ FLAGS = {
     },
     "export": {"--to": ("ply", "compressed-ply", "gltf", "spz", "usd", "x"),
                "--frames": (*NUMBER, "0:1", ":", "1:0")},
-    "plan": {"--material": TEXT, "--object": "file", "--json": None},
+    "plan": {"--material": TEXT, "--object": "file", "--json": None, "--tolerance": NUMBER,
+             "--no-measure": None},
     "materials": {"--json": None},
     "evaluate": {"--prompt": TEXT, "--frames": NUMBER, "--clip": "file"},
     "weights": {},

@@ -11,7 +11,14 @@ import pytest
 from jaxphys.cli.main import run
 from jaxphys.mpm.loop.rollout import step
 from jaxphys.pipeline.frames import simulate
-from jaxphys.pipeline.plan import OPTIONAL, as_text, describe, make_plan, program_parts
+from jaxphys.pipeline.plan import (
+    OPTIONAL,
+    as_text,
+    describe,
+    make_plan,
+    measured,
+    program_parts,
+)
 from jaxphys.scene import Domain, Filling, Ground, Object, Plane, Scene, write_scene
 from jaxphys.scene.build import build
 from tests.mpm.cases import count_primitives
@@ -125,13 +132,25 @@ def test_an_area_has_a_stand_in_of_its_own():
 def test_the_command_says_the_same(tmp_path, capsys):
     path = tmp_path / "scene.json"
     write_scene(path, scene("sand"))
-    assert run(["plan", str(path), "--json"]) == 0
+    assert run(["plan", str(path), "--json", "--no-measure"]) == 0
     said = json.loads(capsys.readouterr().out)
+    assert said["seconds"] is None
     expected = make_plan(scene("sand"))
     assert said["included"] == expected.included and said["steps"] == expected.steps
     assert np.isclose(said["substep"], expected.substep)
     text = as_text(expected)
     assert "law Drucker-Prager" in text and "limited by" in text
+
+
+def test_time_is_measured_on_the_programs_that_run():
+    asked = scene(frames=5)
+    built = build(asked, *_stand_ins(asked))
+    plan = describe(asked, built)
+    assert plan.seconds is None and "time" not in as_text(plan).splitlines()[-1]
+    told = measured(asked, built, plan)
+    assert set(told.seconds) == {"compile", "simulate", "render"}
+    assert min(told.seconds.values()) > 0 and "time on this machine" in as_text(told)
+    assert replace(told, seconds=None) == plan
 
 
 def test_how_devices_share_the_window_is_told():
