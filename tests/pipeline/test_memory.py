@@ -83,7 +83,7 @@ print(json.dumps([peak, sum(expected(asked, build(asked, ball(count))).values())
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [(4_000, 3, 160, 90), (200_000, 3, 640, 360)])
+@pytest.mark.parametrize("size", [(4_000, 3, 160, 90), (100_000, 3, 640, 360)])
 def test_a_fresh_process_takes_about_what_is_expected(tmp_path, size):
     command = [sys.executable, "-c", PEAK, *map(str, size), str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
