@@ -1,9 +1,8 @@
 """Splats that hang beside an object: reconstructed and generated ones hold a few."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+
+from jaxphys.core.parts import connected_parts
 
 # Parts with less than this share of the points are not parts of the object, where those that are
 # hold nearly all.
@@ -23,8 +22,6 @@ def lone_points(points: np.ndarray, reach: float) -> np.ndarray:
         reach: [m], above 0.
     """
     count = len(points)
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs), bool), tuple(pairs.T)), (count, count))
-    _, part = connected_components(links, directed=False)
+    part = connected_parts(points, reach)
     small = (np.bincount(part) < _SMALL * count)[part]
     return small if small.mean() <= 1 - _BODY else np.zeros(count, bool)
