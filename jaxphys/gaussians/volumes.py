@@ -6,6 +6,8 @@ of its own piece (`cell_volumes`). Neither knows the solver's grid: the mass of 
 at every place, turn and spacing.
 """
 
+import math
+
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
@@ -30,6 +32,7 @@ _REACH = 0.65
 # is within the other: it lies among them, not beside them.
 _GAP, _AMONG, _AROUND = 1.2, 0.6, 8
 SAMPLES = 3  # a spacing and axis
+_BLOCK = 2**15  # cells that are sampled at once
 
 
 def thinned(points: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray]:
@@ -104,15 +107,31 @@ def _cell_width(tree: cKDTree) -> np.ndarray:
     return np.median(width[around], axis=1)
 
 
-def _samples(points: np.ndarray, width: float) -> np.ndarray:
-    """Places (Q, 3), 27 to a cell of that width, in all cells with a particle in or beside them."""
-    low = points.min(axis=0) - width / 2
-    held = np.unique(np.floor((points - low) / width).astype(np.int64), axis=0)
-    beside = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    cells = np.unique((held + beside).reshape(-1, 3), axis=0)
-    ticks = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    within = np.stack(np.meshgrid(*[ticks] * 3, indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    return (low + width * (cells + within)).reshape(-1, 3)
+def _cells(points: np.ndarray, low: np.ndarray, width: float) -> np.ndarray:
+    """All cells of that width with a particle in or beside them, (Q, 3), counted from `low`."""
+    held = np.floor((points - low) / width).astype(np.int64)
+    beside = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    shape = [int(count) + 3 for count in held.max(axis=0)]
+    if math.prod(shape) >= 2**63:  # so wide that cells have no number
+        held = np.unique(held, axis=0)
+        return np.unique((held[:, None] + beside).reshape(-1, 3), axis=0)
+    numbers = np.unique(np.ravel_multi_index(tuple(held.T + 1), shape))
+    steps = beside @ np.array([shape[1] * shape[2], shape[2], 1])
+    found = np.unique(numbers[:, None] + steps)
+    return np.stack(np.unravel_index(found, shape), axis=-1) - 1
+
+
+def _owned(tree: cKDTree, points: np.ndarray, width: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The particles, one for each of `places` (Q, 3) that some particle owns."""
+    distance, owner = tree.query(places, workers=-1)
+    distance = distance / width[owner]
+    owned = distance < _REACH
+    gaps = np.flatnonzero(~owned & (distance < _GAP))
+    if len(gaps) and len(points) >= _AROUND:
+        middle = points[tree.query(places[gaps], k=_AROUND, workers=-1)[1]].mean(axis=1)
+        offset = np.linalg.norm(middle - places[gaps], axis=1) / width[owner[gaps]]
+        owned[gaps] = offset < _AMONG
+    return owner[owned]
 
 
 def cell_volumes(points: np.ndarray, single: float) -> np.ndarray:
@@ -136,15 +155,15 @@ def cell_volumes(points: np.ndarray, single: float) -> np.ndarray:
     tree = cKDTree(points)
     width = _cell_width(tree)
     typical = float(np.median(width))
-    places = _samples(points, typical)
-    distance, owner = tree.query(places)
-    distance = distance / width[owner]
-    owned = distance < _REACH
-    gaps = np.flatnonzero(~owned & (distance < _GAP))
-    if len(gaps) and len(points) >= _AROUND:
-        middle = points[tree.query(places[gaps], k=_AROUND)[1]].mean(axis=1)
-        offset = np.linalg.norm(middle - places[gaps], axis=1) / width[owner[gaps]]
-        owned[gaps] = offset < _AMONG
-    volume = np.bincount(owner[owned], minlength=len(points)) * (typical / SAMPLES) ** 3
+    low = points.min(axis=0) - typical / 2
+    cells = _cells(points, low, typical)
+    ticks = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    within = np.stack(np.meshgrid(*[ticks] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    samples = np.zeros(len(points), np.int64)
+    for first in range(0, len(cells), _BLOCK):
+        some = cells[first : first + _BLOCK, None]
+        places = (low + typical * (some + within)).reshape(-1, 3)
+        samples += np.bincount(_owned(tree, points, width, places), minlength=len(points))
+    volume = samples * (typical / SAMPLES) ** 3
     # Particles closer together than the samples share what the nearest sample gave.
     return np.maximum(volume, (typical / SAMPLES) ** 3)
