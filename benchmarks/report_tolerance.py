@@ -20,8 +20,8 @@ counts 2.19 times for it is not exact either (`experiments/tolerance.py`):
     python -m benchmarks report
 
 {ran} of the {drawn} scenes drawn have been run so far, {judged} of them to the end; the command
-goes on with the others. Taken on two cores (Intel Xeon, AVX-512) beside much other work, so that the
-seconds are those of a disturbed machine.
+goes on with the others. Taken on two cores (Intel Xeon, AVX-512) beside much other work, so that
+the seconds are those of a disturbed machine.
 
 {table}
 
@@ -32,8 +32,8 @@ seconds are those of a disturbed machine.
   between them, where the estimate after the run is the one before, the error is all but known from
   the pilots, and these cost more than the run. One scene with a longer film (eight frames; its line
   is in `benchmarks/lines/tolerance-first.jsonl`) was run on a grid 1.4 times finer than its pilots:
-  3.6% were expected, the estimate after the run was 8.8%, the truth 7.4%. The tolerance of 5% was **not
-  kept**, and the run said so.
+  3.6% were expected, the estimate after the run was 8.8%, the truth 7.4%. The tolerance of 5% was
+  **not kept**, and the estimate said so.
 * The scenes are not all unseen. The number of cells was chosen on a jelly ball (below). That orders
   below 1 are taken for 1 was decided after the pilots of that first scene had asked for 327,000
   particles.
