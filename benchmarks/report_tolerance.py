@@ -11,20 +11,61 @@ reads order and error off their differences by Richardson's extrapolation
 is within the tolerance. Error: root mean square over Gaussians and frames of the distance to the
 right motion, over that of their displacements. Where no order shows it refuses and says why.
 
-Checked on scenes that were drawn by seed and not used to choose any constant (one other scene was,
-a jelly ball that falls on a floor):
+## Checked
+
+On scenes that are drawn by seed, each against a run on a grid 1.5 times finer, whose distance
+counts 2.19 times for it is not exact either (`experiments/tolerance.py`):
 
     python -m experiments.tolerance --out benchmarks/lines/tolerance.jsonl
+    python -m benchmarks report
 
-The truth is a run on a grid 1.5 times finer, whose distance counts 2.19 times ({script}). Times
-were taken beside other work on the machine.
+{ran} of the {drawn} scenes drawn have been run so far, {judged} of them to the end; the command
+goes on with the others. Taken on two cores (Intel Xeon, AVX-512) beside much other work, so that
+the seconds are those of a disturbed machine.
 
 {table}
+
+## What that does not show
+
+* **Grids much finer than the pilots'.** Of the {judged} judged, {finer} ran on a grid at least 1.2
+  times finer than their finest pilot's; the others met their tolerance on the pilots' grids or
+  between them, where the estimate after the run is the one before, the error is all but known from
+  the pilots, and these cost more than the run. One scene with a longer film (eight frames; its line
+  is in `benchmarks/lines/tolerance-first.jsonl`) was run on a grid 1.4 times finer than its pilots:
+  3.6% were expected, the estimate after the run was 8.8%, the truth 7.4%. The tolerance of 5% was
+  **not kept**, and the estimate said so.
+* The scenes are not all unseen. The number of cells was chosen on a jelly ball (below). That orders
+  below 1 are taken for 1 was decided after the pilots of that first scene had asked for 327,000
+  particles.
+* Times of runs of a second or two are compilation of windows and what a frame costs at least; the
+  estimate counts neither well.
+* Only the spacing is chosen, and particles and steps with it. Transfer and dtype stay what they
+  are; a tolerance below 1e-4 asks for float64.
+
+## Why 7, 9.9 and 14 cells
+
+A jelly ball (0.8 m; 0.65 m is the side of a cube of its volume) dropped on a floor, half a second,
+against a grid of 1/32 m:
+
+| spacings, m | cells of the finest | order seen | error estimated | distance to 1/32 m |
+|---|---|---|---|---|
+| 0.25, 0.177, 0.125 | 5.2 | none, opposite directions | refused | 0.128 |
+| 0.177, 0.125, 0.088 | 7.3 | 0.02 | refused | 0.068 |
+| 0.125, 0.088, 0.0625 | 10.3 | 0.75 | 0.123 | 0.024 |
+| 0.088, 0.0625, 0.0442 | 14.6 | 1.67 | 0.037 | 0.027 |
 """
 
 
 def tolerance_page(path: Path) -> str:
     """The page, from its lines."""
-    from experiments.tolerance import read, table
+    from experiments.tolerance import drawn, read, table
 
-    return PAGE.format(script="`experiments/tolerance.py` says why", table=table(read(path)))
+    lines = read(path)
+    good = [line for line in lines if line["status"] == "ok"]
+    return PAGE.format(
+        ran=len(lines),
+        drawn=len(drawn()),
+        judged=len(good),
+        finer=sum(line["spacings"][-1] >= 1.2 * line["spacing"] for line in good),
+        table=table(lines),
+    )

@@ -25,7 +25,7 @@ LEAST_ORDER, MOST_ORDER = 0.5, 3.0
 TRUSTED = (1.0, 2.0)
 # Cosine between the two differences below which they have nothing to do with each other.
 LEAST_ALIGNMENT = 0.3
-ROUNDING = 1e-5  # relative differences that float32 makes by itself (docs/benchmarks/tolerance.md)
+ROUNDING = 1e-5  # relative differences that are taken for those of float32's rounding
 
 
 class NoOrder(InputError):

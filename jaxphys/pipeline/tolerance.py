@@ -26,7 +26,7 @@ from jaxphys.scene.scene import Scene
 LEAST, MOST = 1e-6, 1.0
 # Below it a difference between two grids is too small to be told from that between two fillings.
 DISTINCT = 1.2
-SINGLE = 1e-4  # tolerances below it ask for float64 (docs/benchmarks/tolerance.md)
+SINGLE = 1e-4  # tolerances below it ask for float64, to stay well above float32's rounding
 
 
 @dataclass(frozen=True)
