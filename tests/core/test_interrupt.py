@@ -30,7 +30,7 @@ def command(folder: str) -> int:
                     assert not interrupted() or index >= 20
     return 0
 
-cli.commands.doctor = lambda: command(sys.argv[1])
+cli.COMMANDS["doctor"] = lambda: command(sys.argv[1])
 sys.argv[1:] = [sys.argv[1]]
 status = cli.run(["doctor"])
 sys.exit(status)
