@@ -16,6 +16,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.core.linear_map import linear_map, zero_tangent
+from jaxphys.core.own_rule import own_rule
 from jaxphys.mpm.boundaries import stages
 from jaxphys.mpm.loop import halo
 from jaxphys.mpm.loop.one_pass import Fixed, Inputs, at_nodes, for_runs, run_pass, whole
@@ -45,15 +46,15 @@ def one_pass(config: Config, last: bool, inputs: Inputs, fixed: Fixed):
     return _pass(config, last, inputs, fixed)[:2]
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(0, 1))
 def _pass(config: Config, last: bool, inputs: Inputs, fixed: Fixed):
     """`run_pass`. What was gathered is among the results, since the derivative's own derivative
     must know how it changes.
     """
-    return run_pass(config, last, inputs, fixed)
+    return own_rule(
+        partial(run_pass, config, last), partial(_pass_jvp, config, last), inputs, fixed
+    )
 
 
-@_pass.defjvp
 def _pass_jvp(config, last, primals, tangents):
     inputs, fixed = primals
     results, told, gathered = _pass(config, last, inputs, fixed)
