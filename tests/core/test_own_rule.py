@@ -1,4 +1,4 @@
-"""A function whose derivative JAX finds wrong, and a rule that finds it right, whatever is done to it."""
+"""A function whose derivative JAX finds wrong, and a rule that finds it right in every order."""
 
 from functools import partial
 
