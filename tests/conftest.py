@@ -1,3 +1,4 @@
+import ctypes
 import gc
 import os
 import sys
@@ -35,12 +36,21 @@ def _memory_maps() -> int:
     return maps.read_bytes().count(b"\n") if maps.exists() else 0
 
 
+def _resident_bytes() -> int:
+    statistics = Path("/proc/self/statm")
+    pages = int(statistics.read_text().split()[1]) if statistics.exists() else 0
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
 @pytest.fixture(autouse=True, scope="module")
 def room_for_programs():
-    """Every compiled program keeps memory maps of its own, of which Linux gives a process 65,530:
-    with more the next compilation crashes. What is compiled again comes from the cache on disk.
+    """Every compiled program keeps memory, and maps of its own, of which Linux gives a process
+    65,530: with more the next compilation crashes. What is compiled again comes from the cache on
+    disk.
     """
     yield
-    if _memory_maps() > 20_000:
+    if _memory_maps() > 20_000 or _resident_bytes() > 1.5 * 2**30:
         jax.clear_caches()
         gc.collect()
+        if sys.platform == "linux":
+            ctypes.CDLL(None).malloc_trim(0)  # what was freed goes back to the system

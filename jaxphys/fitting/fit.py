@@ -66,7 +66,7 @@ def fit(
     memory: Memory | None = None,
     watch: Callable[[], None] | None = None,
 ) -> Fit:
-    """Finds numbers with which a simulation moves as was observed.
+    """Finds numbers with which a simulation moves as was observed::
 
         fit = jaxphys.fit(
             simulation,

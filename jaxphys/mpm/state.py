@@ -35,21 +35,23 @@ CODES = 10
 class Config:
     """What decides which program is compiled. Hashable.
 
-    grid: the background grid.
-    segments: (law, start, stop) for contiguous runs of particles, from 0 to N without gaps.
-    track_total: keep the total deformation gradient beside the elastic one. Has an effect only
-        where a law is plastic; elsewhere the two are the same.
-    window: nodes per axis of the part of the grid that is computed, or None for all of it. The
-        window follows the particles; if they outgrow it, the status says so. A block of particles
-        that spans c cells needs c + 3 nodes, c + 4 with cubic splines, two more if it moves, and
-        room for what its motion adds.
-    check_step: compare dt with what the state's stiffness allows, at the start of every rollout.
-    tells_rates: a pass tells how fast its particles move and deform (`Seen.rates`), for steps that
-        adapt.
-    placement: in which chunks and on which devices particles are computed.
-    transfer: how particles and grid exchange velocities, and with which kernel.
-    slabs: how devices share the window, or None where each has all of it. A slab follows the
-        particles of its device; if they outgrow it, the status says so.
+    Attributes:
+        grid: the background grid.
+        segments: (law, start, stop) for contiguous runs of particles, from 0 to N without gaps.
+        track_total: keep the total deformation gradient beside the elastic one. Has an effect only
+            where a law is plastic; elsewhere the two are the same.
+        window: nodes per axis of the part of the grid that is computed, or None for all of it. The
+            window follows the particles; if they outgrow it, the status says so. A block of
+            particles that spans c cells needs c + 3 nodes, c + 4 with cubic splines, two more if it
+            moves, and room for what its motion adds.
+        check_step: compare dt with what the state's stiffness allows, at the start of every
+            rollout.
+        tells_rates: a pass tells how fast its particles move and deform (`Seen.rates`), for steps
+            that adapt.
+        placement: in which chunks and on which devices particles are computed.
+        transfer: how particles and grid exchange velocities, and with which kernel.
+        slabs: how devices share the window, or None where each has all of it. A slab follows the
+            particles of its device; if they outgrow it, the status says so.
     """
 
     grid: Grid

@@ -100,7 +100,7 @@ def displacements(truth: Ringing, X: np.ndarray, **accuracy) -> np.ndarray:
 def ringing(
     truth: Ringing, cells: int, per_axis: int = 2, courant: float = 0.4, dtype=jnp.float64, **more
 ) -> Discretisation:
-    """The cube on cells of 1 / cells [m] with `per_axis`^3 particles each.
+    """The cube on cells of 1 / cells [m] with `per_axis**3` particles each.
 
     more: as for `discretise`: transfer, staggered.
     """

@@ -1,4 +1,12 @@
-"""Cameras, projection, tile binning, blending: splats to pictures, differentiably."""
+"""Cameras, projection, tile binning, blending: splats to pictures, differentiably.
+
+The package may be called: `jaxphys.render(...)` is `jaxphys.render.render(...)`. An imported
+package is an attribute of the one around it, so that no function of this name could be beside it.
+"""
+
+import sys
+from types import ModuleType
+from typing import Any
 
 from .camera import Camera as Camera
 from .camera import look_at as look_at
@@ -15,3 +23,11 @@ from .renderer import next_capacity as next_capacity
 from .renderer import render as render
 from .renderer import required_pairs as required_pairs
 from .settings import Settings as Settings
+
+
+class _Renders(ModuleType):
+    def __call__(self, *arguments: Any, **options: Any) -> Image:
+        return render(*arguments, **options)
+
+
+sys.modules[__name__].__class__ = _Renders

@@ -25,9 +25,10 @@ WHOLE_CHUNKS = 4  # as many on one device are computed as a whole
 class Placement:
     """How the particles of a step are spread. Part of the program.
 
-    devices: how many; the first ones of `jax.devices()`.
-    chunk: particles that are computed together, at most; None for all that a device has. Chunks
-        that stay in the cache are what makes a processor fast; an accelerator wants one.
+    Attributes:
+        devices: how many; the first ones of `jax.devices()`.
+        chunk: particles that are computed together, at most; None for all that a device has. Chunks
+            that stay in the cache are what makes a processor fast; an accelerator wants one.
     """
 
     devices: int = 1
