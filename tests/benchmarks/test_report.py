@@ -95,7 +95,7 @@ def test_the_report_is_made_of_lines_alone_and_is_the_same_again(tmp_path):
     assert "a processor, 2 cores, jax 0.0, commit abc" in page
     assert "| bar | 8, 16, 32 | 1.6e-02, 3.9e-03, 9.8e-04 | exact | 2 | 2.00 |" in page
     assert "out of memory" in page and "failed" in page
-    assert "| genesis | 1.0e-02, 0.2 s |" in page and "left out" not in page
+    assert "| genesis | 1.0e-02, 0.2 s |" in page and "newton left out" not in page
     before = {one.name: one.read_bytes() for one in out.iterdir()}
     assert set(before) == {"README.md", "error-time.svg", "variants.svg", "profile.svg"}
     write_report(folder, out)
