@@ -23,9 +23,10 @@ at controls, which must be found out, and at the exception that
 PEERS = """
 ## Peers
 
-Scenes of this page that peers can state, made by `python -m benchmarks run extreme-peers --out
-{file}` with the interpreters that [peers](peers.md) tells of; versions are there. All are held to
-what any solver owes (`benchmarks/extreme/peers.py`), within a percent or so: where the middle goes,
+Scenes of this page that peers can state, made by
+`python -m benchmarks run extreme-peers --out {file}`
+with the interpreters that [peers](peers.md) tells of; versions are there. All are held to what any
+solver owes (`benchmarks/extreme/peers.py`), within a percent or so: where the middle goes,
 momentum, angular momentum to 5 %, an energy that grows by no more than 10 %, one motion at every
 stiffness, a rigid turn, and for particles alone (Genesis, which takes this solver's very steps) the
 closed form. Genesis takes half of our largest stable step, Newton four times it: Genesis suggests a
