@@ -98,6 +98,7 @@ def run_suite(suite: str, quick: bool, times: int | None = None) -> Iterator[dic
     if own is not None:
         yield from own(quick)
         return
+    yield from getattr(suite_module(suite), "left_out_lines", list)()
     for _, group in groupby(suite_cases(suite, quick), key=lambda case: case.name):
         cases = list(group)
         rounds: dict[str, list[dict]] = {case.method: [] for case in cases}

@@ -41,6 +41,9 @@ LINES = [
     {"suite": "work-precision", "case": "vortex-8", "method": "jaxphys-float64", "cells": 8,
      "status": "exit 1: out of memory"},
     {"suite": "work-precision", "case": "bar-8", "method": "jaxphys", "peer": "x", "ratio": 2.0},
+    line("particle", "jaxphys-float64", 50, 0.01, 0.1),
+    line("particle", "genesis", 50, 0.01, 0.2),
+    {"suite": "work-precision", "case": "peers", "method": "newton", "status": "newton left out"},
     line("picture", "jaxphys", 240, 1e-3, 0.01),
     line("gradient", "jaxphys", 64, 1e-6, 0.5),
 ]  # fmt: skip
@@ -92,6 +95,7 @@ def test_the_report_is_made_of_lines_alone_and_is_the_same_again(tmp_path):
     assert "a processor, 2 cores, jax 0.0, commit abc" in page
     assert "| bar | 8, 16, 32 | 1.6e-02, 3.9e-03, 9.8e-04 | exact | 2 | 2.00 |" in page
     assert "out of memory" in page and "failed" in page
+    assert "| genesis | 1.0e-02, 0.2 s |" in page and "newton left out" not in page
     before = {one.name: one.read_bytes() for one in out.iterdir()}
     assert set(before) == {"README.md", "error-time.svg", "variants.svg", "profile.svg"}
     write_report(folder, out)
