@@ -11,7 +11,7 @@ from jaxphys.mpm.materials.catalogue import get_material
 from jaxphys.mpm.stepping import Adaptive, Fixed, Implicit
 from jaxphys.scene.build import validate
 from jaxphys.scene.defaults import default_scene
-from jaxphys.scene.model_folder import is_trained, splats_in
+from jaxphys.scene.model_folder import GENERATED, is_trained, splats_in
 from jaxphys.scene.read import read_scene
 from jaxphys.scene.scene import Scene
 
@@ -33,8 +33,8 @@ def scene_for(
     """
     if config is None and material is None and source is not None and source.is_dir():
         config = source / "config.json"
-        if is_trained(source) and not config.exists():
-            config = None
+        if not config.exists() and (is_trained(source) or (source / GENERATED).exists()):
+            config = None  # of photographs, with no scene yet
     if base is not None:
         scene = base
     elif config is not None:
