@@ -193,7 +193,7 @@ def test_similarity():
     every = []
     for i, j in np.ndindex(13, 9):
         p, q = (np.pad(one, around)[i : i + 11, j : j + 11] for one in (a, b))
-        mean = lambda one: np.sum(weights * one, axis=(0, 1))  # noqa: B023, E731
+        mean = lambda one: np.sum(weights * one, axis=(0, 1))  # noqa: E731
         vp, vq = mean(p * p) - mean(p) ** 2, mean(q * q) - mean(q) ** 2
         covariance = mean(p * q) - mean(p) * mean(q)
         above = (2 * mean(p) * mean(q) + 1e-4) * (2 * covariance + 9e-4)
