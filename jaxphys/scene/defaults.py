@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Literal
 
-from jaxphys.mpm.boundaries import Capsule, Cuboid, Keyframes, Plane, Vector, Walls
+from jaxphys.mpm.boundaries import Capsule, Keyframes, Plane, Vector, Walls
 from jaxphys.mpm.materials.catalogue import get_material
 from jaxphys.scene.scene import Domain, Filling, Ground, Object, Region, Rotation, Scene
 
@@ -23,7 +23,6 @@ MIDDLE = SIDE / 2
 # cells outside it.
 FLOOR = 0.25
 INSET = 0.2
-GRAIN = 0.2  # by which grains of sand differ in brightness
 # Turns a capsule so that it lies along the view of the usual camera (`View.azimuth`), -60 degrees.
 INTO_PICTURE = (0.70711, 0.61237, 0.35355, 0.0)
 TANK = 0.6  # from the domain's sides to those of the glass tank that water is poured into
@@ -104,7 +103,6 @@ def _sand(domain: Domain) -> Scene:
         size=size,
         centre=_above(0.05, size),
         filling=Filling(show=True),
-        grain=GRAIN,
     )
     return _scene(thing, domain, friction=0.7, splats_follow="elastic")
 
@@ -184,8 +182,7 @@ def _snow(domain: Domain) -> Scene:
 
 
 def _wet_sand(domain: Domain) -> Scene:
-    scene = _dropped("wet-sand", domain, gap=0.3, speed=3.0, friction=0.7)
-    return replace(scene, objects=(replace(scene.objects[0], grain=GRAIN),))
+    return _dropped("wet-sand", domain, gap=0.3, speed=3.0, friction=0.7)
 
 
 def _memory_foam(domain: Domain) -> Scene:
@@ -209,16 +206,8 @@ def _memory_foam(domain: Domain) -> Scene:
 
 
 def _muscle(domain: Domain) -> Scene:
-    size, gap = 0.75, 0.35
-    scene = _dropped("muscle", domain, size=size, gap=gap, speed=0.0, follow="total", damping=2.5)
-    # Hung by its top it pulls itself up, again and again; lying there it would be a jelly.
-    beam = Cuboid(
-        centre=(MIDDLE, MIDDLE, FLOOR + gap + size),
-        half_size=(0.45, 0.1, 0.1),
-        rounding=0.02,
-        surface="sticky",
-    )
-    return replace(scene, boundaries=(*scene.boundaries, beam))
+    # It stands there and works; at rest nothing would tell it from a jelly.
+    return _dropped("muscle", domain, gap=0.01, speed=0.0, follow="total", damping=2.5)
 
 
 _SCENES: dict[str, Callable[[Domain], Scene]] = {

@@ -1,7 +1,6 @@
 """Objects put where a scene wants them: chosen, turned, scaled, moved, filled."""
 
 import math
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -19,7 +18,7 @@ from jaxphys.gaussians.gaussians import (
     select,
     transform,
 )
-from jaxphys.gaussians.harmonics import dc_to_rgb, rgb_to_dc
+from jaxphys.gaussians.harmonics import dc_to_rgb
 from jaxphys.gaussians.hull import GAP, surface_spacing
 from jaxphys.gaussians.lone import lone_points
 from jaxphys.gaussians.relax import blue_noise
@@ -121,8 +120,6 @@ def place(
     filling, volumes = filled.points, filled.volumes
     if thing.filling is not None and thing.filling.show and len(filling):
         moving, filling = concatenate([moving, _shown(filling, moving, thing, grid)]), filling[:0]
-    if thing.grain:
-        moving = _grainy(moving, thing.grain, seed)
     moving, still = (transform(part, translation=centre) for part in (moving, still))
     filling = (filling + centre).astype(moving.means.dtype)
     placement = Placement.of(rotation, scale, middle, centre)
@@ -182,16 +179,6 @@ def _shown(points: np.ndarray, moving: Gaussians, thing: Object, grid: Grid) -> 
     # What does not fit even so is faint: the renderer draws no splat smaller than a pixel.
     opacity = OPACITY * np.minimum(fits / sizes, 1) ** 2
     return from_points(points.astype(moving.means.dtype), colours, sizes, opacity=opacity)
-
-
-def _grainy(moving: Gaussians, grain: float, seed: int) -> Gaussians:
-    """Each one lighter or darker than it was by a share of its colour, none out of their range."""
-    harmonics = np.array(moving.harmonics)
-    colours = np.asarray(dc_to_rgb(harmonics[:, 0]))
-    share = np.random.default_rng(seed).normal(0.0, grain, (moving.count, 1))
-    lit = np.clip(colours * (1 + share), colours.min(), colours.max())
-    harmonics[:, 0] = rgb_to_dc(lit)
-    return replace(moving, harmonics=jnp.asarray(harmonics))
 
 
 def _numbers(values) -> str:

@@ -116,8 +116,6 @@ class Object(Checked):
             moves; null: all.
         filling: null leaves the object hollow.
         splats: number of Gaussians made where the source is a mesh.
-        grain: by what share of itself the brightness of a Gaussian differs from its neighbours'
-            (standard deviation): grains of sand. Drawn only.
     """
 
     source: str | None = None
@@ -135,7 +133,6 @@ class Object(Checked):
     area: Area | None = field(default=None, metadata=PLACE)
     filling: Filling | None = field(default_factory=Filling)
     splats: int = field(default=20_000, metadata=between(1, MOST_SPLATS))
-    grain: float = field(default=0.0, metadata=between(0, 1))
 
 
 @dataclass(frozen=True)

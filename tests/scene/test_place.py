@@ -7,7 +7,6 @@ import trimesh
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import Gaussians, concatenate, from_points, to_splats
-from jaxphys.gaussians.harmonics import dc_to_rgb
 from jaxphys.gaussians.surface import gaussians_from_mesh
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.transfer.kernels import QUADRATIC
@@ -123,22 +122,3 @@ def test_what_cannot_be_placed_names_its_field():
     refuse(r"objects\[0\]\.rotation\[0\]\.axis", rotation=(Rotation((0.0, 0.0, 0.0), 3.0),))
     refuse(r"objects\[0\]\.filling: .* more than the maximum of 5", filling=Filling(maximum=5))
     refuse(r"objects\[0\]: reaches from .* change its size or centre", centre=(0.3, 1.2, 1.2))
-
-
-def test_grains_differ_in_brightness_about_the_colour_they_had_and_in_nothing_else():
-    points = np.random.default_rng(0).normal(size=(4000, 3)).astype(np.float32)
-    points /= 2 * np.linalg.norm(points, axis=1, keepdims=True)
-    colours = np.tile([0.4, 0.3, 0.2], (len(points), 1))
-    colours[0], colours[1] = 0.0, 1.0  # the range within which the others stay
-    ball = from_points(points, colours, 0.02)
-    grainy = put(dataclasses.replace(THING, grain=0.2), ball).moving
-    after = np.asarray(dc_to_rgb(grainy.harmonics[:, 0]))[2:]
-    factor = after / colours[2:]
-    np.testing.assert_allclose(factor[:, 0], factor[:, 2], rtol=1e-4)  # no hue
-    assert factor[:, 0].mean() == pytest.approx(1, abs=0.01)
-    assert factor[:, 0].std() == pytest.approx(0.2, rel=0.05)
-    plain_ball = put(THING, ball).moving
-    for name in ("means", "log_scales", "quaternions", "opacity_logits"):
-        np.testing.assert_array_equal(getattr(plain_ball, name), getattr(grainy, name))
-    again = put(dataclasses.replace(THING, grain=0.2), ball).moving
-    np.testing.assert_array_equal(again.harmonics, grainy.harmonics)

@@ -199,7 +199,7 @@ _materials: dict[str, Material] = {
             fibre_stiffening=1.0,
             fibre_azimuth=0.0,
             fibre_elevation=90.0,
-            fibre_tension=8e3,
+            fibre_tension=5e3,
             contraction_period=0.8,
             density=300.0,
         ),
