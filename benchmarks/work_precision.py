@@ -229,32 +229,34 @@ def left_out_lines() -> list[dict]:
 
 def cases(quick: bool) -> list[Case]:
     """The whole sweep: one case for every grid of every problem, its methods in turn."""
-    varied = QUICK_VARIED if quick else VARIED
+    varied, ladders = (QUICK_VARIED, QUICK) if quick else (VARIED, LADDERS)
     found = []
-    for name, ladder in (QUICK if quick else LADDERS).items():
-        for resolution in ladder:
-            methods = {"jaxphys-float64": partial(prepare, name, resolution, {})}
-            if resolution in varied.get(name, ()):
-                methods["jaxphys"] = partial(prepare, name, resolution, {"dtype": "float32"})
-                for variant in QUICK_VARIANTS if quick else VARIANTS:
-                    if variant in WITHOUT.get(name, ()):
-                        continue
+    # Coarse grids of all problems first, so that a sweep that is cut short has seen them all.
+    for name, resolution in sorted(
+        ((name, resolution) for name, ladder in ladders.items() for resolution in ladder),
+        key=lambda one: ladders[one[0]].index(one[1]),
+    ):
+        methods = {"jaxphys-float64": partial(prepare, name, resolution, {})}
+        if resolution in varied.get(name, ()):
+            methods["jaxphys"] = partial(prepare, name, resolution, {"dtype": "float32"})
+            for variant in QUICK_VARIANTS if quick else VARIANTS:
+                if variant not in WITHOUT.get(name, ()):
                     methods[f"jaxphys-{variant}"] = partial(
                         prepare, name, resolution, VARIANTS[variant]
                     )
-                if name in PEER_CASES:
-                    methods["taichi"] = partial(prepare_peer, name, resolution)
-            peers = peer_methods(name, resolution, quick)
-            for method, run in (methods | peers).items():
-                single = method in ("jaxphys", "taichi", *peers)
-                found.append(
-                    Case(
-                        f"{name}-{resolution}",
-                        method,
-                        run,
-                        {"cells": resolution},
-                        dtype="float32" if single else "float64",
-                        rounds=1,
-                    )
+            if name in PEER_CASES:
+                methods["taichi"] = partial(prepare_peer, name, resolution)
+        peers = peer_methods(name, resolution, quick)
+        for method, run in (methods | peers).items():
+            single = method in ("jaxphys", "taichi", *peers)
+            found.append(
+                Case(
+                    f"{name}-{resolution}",
+                    method,
+                    run,
+                    {"cells": resolution},
+                    dtype="float32" if single else "float64",
+                    rounds=1,
                 )
+            )
     return [*found, *picture_cases(quick), *gradient_cases(quick)]
