@@ -2,9 +2,9 @@
 
     python -m benchmarks report
 
-reads work-precision.jsonl and tolerance.jsonl of benchmarks/lines, and writes README.md and
-tolerance.md of docs/benchmarks and the figures that they show. The same lines give the same
-bytes.
+reads work-precision.jsonl, tolerance.jsonl and leave-out.jsonl of benchmarks/lines, and writes
+README.md, tolerance.md and leave_out.md of docs/benchmarks and the figures that they show. The
+same lines give the same bytes.
 """
 
 import json
@@ -12,7 +12,9 @@ import math
 from collections import Counter, defaultdict
 from pathlib import Path
 
+from benchmarks.leave_out import cases as leave_out_cases
 from benchmarks.report_figures import draw_profile, draw_sheet
+from benchmarks.report_leave_out import leave_out_page
 from benchmarks.report_tolerance import tolerance_page
 
 SUITE = "work-precision"
@@ -254,3 +256,7 @@ def write_report(lines_folder: Path, out: Path) -> None:
     path = lines_folder / "tolerance.jsonl"
     if path.exists():
         (out / "tolerance.md").write_text(tolerance_page(path))
+    path = lines_folder / "leave-out.jsonl"
+    if path.exists():
+        parts = list(dict.fromkeys(case.name for case in leave_out_cases(quick=False)))
+        (out / "leave_out.md").write_text(leave_out_page(path, parts))
