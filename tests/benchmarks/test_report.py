@@ -109,7 +109,8 @@ def test_what_parts_cost(tmp_path):
     def of(part, method, compiled, peak):
         return {
             "suite": "leave-out", "case": part, "method": method, "status": "ok", "cells": 20,
-            "compile_seconds": compiled, "peak_bytes": peak, "machine": {"processor": "a processor"},
+            "compile_seconds": compiled, "peak_bytes": peak,
+            "machine": {"processor": "a processor"},
         }  # fmt: skip
 
     lines = [
