@@ -22,6 +22,7 @@ from jaxphys.cli.fit import fit
 from jaxphys.cli.page import page
 from jaxphys.cli.priors import priors
 from jaxphys.cli.study import study
+from jaxphys.cli.view import view
 from jaxphys.core.errors import InputError, one_line
 
 FAULT, REFUSED, INTERRUPTED, UNHEARD = 1, 2, 130, 141
@@ -38,6 +39,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "materials": commands.materials,
     "priors": priors,
     "evaluate": evaluate,
+    "view": view,
     "page": page,
     "study": study,
     "weights": weights.weights,

@@ -1,0 +1,208 @@
+"""The viewer as a whole: one thread computes and shows, the browser's threads ask.
+
+browser --events--> queue --> session --Shown--> window --> browser
+"""
+
+import io
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+
+from jaxphys.core.errors import InputError
+from jaxphys.pipeline.plan import describe, make_plan, memory_text
+from jaxphys.pipeline.replay import replay
+from jaxphys.scene.json import to_json
+from jaxphys.scene.scene import Scene
+from jaxphys.scene.source import load_object
+from jaxphys.viewer.events import Event, Picture, PlanFilm, Queue, Reset, SaveScene, SetMaterial
+from jaxphys.viewer.panel import Panel
+from jaxphys.viewer.playback import Playback
+from jaxphys.viewer.session import GAUSSIANS, NODES, Session
+from jaxphys.viewer.window import Window
+
+PATIENCE = 0.2  # [s] between looks at whether to stop, where nothing plays
+FASTEST = 1 / 30  # [s] a frame
+PICTURE = 800, 600
+COMMAND = "jaxphys animate --config scene.json --out outputs/viewed"
+
+
+def view_scene(
+    scene: Scene,
+    beside: Path | None = None,
+    *,
+    port: int = 0,
+    nodes: int = NODES,
+    gaussians: int = GAUSSIANS,
+    tell: Callable[[str], None] = print,
+    stop: Callable[[], bool] = lambda: False,
+) -> None:
+    """Shows a scene that runs, until `stop()`.
+
+    Args:
+        scene: as `animate` takes it, with sources.
+        beside: where relative sources are looked up first.
+        port: 0: a free one.
+        nodes, gaussians: of the grid and of each object, at most.
+        tell: gets the address.
+
+    Raises:
+        InputError: the scene cannot be built, or there is no viser or no port.
+    """
+    objects = tuple(
+        load_object(thing, beside, scene.seed + i, f"objects[{i}]")
+        for i, thing in enumerate(scene.objects)
+    )
+    session = Session(scene, objects, beside=beside, nodes=nodes, gaussians=gaussians)
+    queue = Queue()
+    window = Window(queue, port, "jaxphys view")
+    try:
+        panel = window.panel = Panel(window.server, queue)
+        panel.for_simulation(session.scene, COMMAND)
+        _list_movable(panel, session)
+        panel.tell_plan(plan_text(session))
+        window.floor(scene.ground, scene.domain.size)
+        window.clicks()
+        _run(window, queue, session, scene.seconds_per_frame, tell, stop, _Keeper(window, session))
+    finally:
+        window.stop()
+
+
+def view_run(
+    directory: Path,
+    *,
+    port: int = 0,
+    tell: Callable[[str], None] = print,
+    stop: Callable[[], bool] = lambda: False,
+) -> None:
+    """Plays a finished run, until `stop()`. Arguments are those of `view_scene`.
+
+    Raises:
+        InputError: no finished run, or there is no viser or no port.
+    """
+    playback = Playback(replay(directory, progress=True))
+    queue = Queue()
+    window = Window(queue, port, f"jaxphys view {directory.name}")
+    try:
+        window.panel = Panel(window.server, queue, frames=playback.count)
+        window.floor(playback.scene.ground, playback.scene.domain.size)
+        seconds = 1 / playback.scene.fps
+        _run(window, queue, playback, seconds, tell, stop, lambda event: False)
+    finally:
+        window.stop()
+
+
+def plan_text(session: Session) -> str:
+    """What runs here, before it does: sizes, steps and memory."""
+    plan = describe(session.small, session.built)
+    grid = " x ".join(map(str, plan.grid))
+    lines = [
+        f"**here**: {plan.particles} particles, grid {grid}",
+        f"step {plan.substep:.2e} s, limited by {plan.reason}; {plan.steps_per_frame} a frame",
+        memory_text(plan),
+    ]
+    return "\n\n".join(lines)
+
+
+def film_text(scene: Scene) -> str:
+    """What `animate` takes for the film of a scene, with the time on this machine."""
+    plan = make_plan(scene, measure=True)
+    assert plan.seconds is not None
+    grid = " x ".join(map(str, plan.grid))
+    total = sum(plan.seconds.values())
+    parts = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in plan.seconds.items())
+    lines = [
+        f"**the film**: {plan.particles} particles, grid {grid}",
+        f"step {plan.substep:.2e} s; {plan.steps} steps in {plan.frames} frames",
+        memory_text(plan),
+        f"time, roughly: {total:.0f} s ({parts})",
+    ]
+    return "\n\n".join(lines)
+
+
+class _Keeper:
+    """Carries out what is kept: files, plans and pictures."""
+
+    def __init__(self, window: Window, session: Session):
+        self._window, self._session = window, session
+
+    def __call__(self, event: Event) -> bool:
+        """Whether the event was for it."""
+        session, window, panel = self._session, self._window, self._window.panel
+        assert panel is not None
+        match event:
+            case SaveScene():
+                text = json.dumps(to_json(session.saved()), indent=2, sort_keys=True) + "\n"
+                window.hand_over(event.client, "scene.json", text.encode())
+            case PlanFilm():
+                panel.tell_plan(f"{plan_text(session)}\n\n{film_text(session.saved())}")
+            case Picture():
+                pixels = session.picture(window.camera_of(event.client, *PICTURE))
+                panel.show_picture(pixels)
+                window.hand_over(event.client, "picture.png", _png(pixels))
+            case _:
+                return False
+        return True
+
+
+def _run(
+    window: Window,
+    queue: Queue,
+    session: Session | Playback,
+    seconds: float,
+    tell: Callable[[str], None],
+    stop: Callable[[], bool],
+    keep: Callable[[Event], bool],
+) -> None:
+    """The one thread that computes."""
+    panel = window.panel
+    assert panel is not None
+    shown = session.shown()
+    window.stand(session.camera, np.median(shown.splats.means, axis=0))
+    window.show(shown)
+    panel.tell(session.message, session.playing)
+    tell(window.address)
+    due = time.monotonic()
+    while not stop():
+        wait = due - time.monotonic() if session.playing else PATIENCE
+        events = queue.take(max(wait, 0.0))
+        for event in events:
+            _carry_out(event, session, panel, keep)
+        if session.playing and time.monotonic() >= due:
+            due = time.monotonic() + max(seconds, FASTEST)
+            session.advance()
+        elif not events:
+            continue
+        window.show(session.shown())
+        panel.tell(session.message, session.playing)
+
+
+def _carry_out(
+    event: Event, session: Session | Playback, panel: Panel, keep: Callable[[Event], bool]
+) -> None:
+    try:
+        if keep(event):
+            return
+    except InputError as error:
+        session.message = str(error)
+        return
+    session.do(event)
+    if isinstance(session, Session) and isinstance(event, Reset | SetMaterial):
+        if isinstance(event, SetMaterial):
+            panel.list_numbers(session.scene)
+        _list_movable(panel, session)
+        panel.tell_plan(plan_text(session))
+
+
+def _list_movable(panel: Panel, session: Session) -> None:
+    kinds = {i: session.scene.boundaries[i].type for i in session.movable}
+    panel.list_movable(session.movable, kinds)
+
+
+def _png(pixels: np.ndarray) -> bytes:
+    made = io.BytesIO()
+    iio.imwrite(made, pixels, extension=".png")
+    return made.getvalue()
