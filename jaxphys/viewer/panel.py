@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from jaxphys.mpm.boundaries import Vector
+from jaxphys.mpm.boundaries import Box, Plane, Vector
 from jaxphys.mpm.materials.catalogue import MATERIALS
 from jaxphys.scene.scene import Scene
 from jaxphys.viewer.events import (
@@ -26,6 +26,8 @@ from jaxphys.viewer.events import (
 from jaxphys.viewer.numbers import Number, numbers_of
 
 COLOURS = ("#d62728", "#1f77b4", "#2ca02c")
+PLATE = (0.8, 0.8, 0.004)  # [m], for a plane
+UNTURNED = (1.0, 0.0, 0.0, 0.0)
 HELP = (
     "Drag to orbit, scroll to zoom. **Click the object** to poke it, or to grab it and pull by "
     "the arrows that come up. Planes and boxes move by their arrows."
@@ -114,16 +116,25 @@ class Panel:
         made.on_update(moved)
         return made
 
-    def list_movable(self, places: dict[int, Vector], kinds: dict[int, str]) -> None:
-        """Arrows at the planes and boxes that hands may move, where they are now."""
+    def list_movable(self, boundaries: dict[int, Plane | Box]) -> None:
+        """Arrows at the planes and boxes that hands may move, by their place in the scene's list:
+        each where it is now."""
         for one in self._gizmos.values():
             one.remove()
         self._gizmos = {}
-        for i, place in places.items():
+        for i, boundary in boundaries.items():
+            name = f"/boundaries/{i}"
+            if isinstance(boundary, Plane):
+                place, sides, turn = boundary.point, PLATE, upright(boundary.normal)
+            else:
+                x, y, z = boundary.half_size
+                place, sides, turn = boundary.centre, (2 * x, 2 * y, 2 * z), UNTURNED
             made = self._scene.add_transform_controls(
-                f"/boundaries/{i}", scale=0.2, disable_rotations=True, position=place
+                name, scale=0.25, disable_rotations=True, depth_test=False, position=place
             )
-            self._scene.add_label(f"/boundaries/{i}/name", f"{kinds[i]} {i}")
+            self._scene.add_box(
+                f"{name}/shape", (90, 120, 160), sides, opacity=0.25, wxyz=turn, cast_shadow=False
+            )
 
             def moved(event, i=i) -> None:
                 x, y, z = np.asarray(event.target.position, np.float64).tolist()
@@ -199,3 +210,13 @@ class Panel:
         # What the film itself sets is no wish of a user's.
         if event.client is not None:
             self._queue.put(Seek(int(event.target.value)))
+
+
+def upright(normal: Vector) -> tuple[float, float, float, float]:
+    """The quaternion w, x, y, z that turns z to a direction of any length but zero."""
+    x, y, z = np.asarray(normal, np.float64) / np.linalg.norm(normal)
+    if z < -1 + 1e-9:
+        return 0.0, 1.0, 0.0, 0.0
+    half = np.array([1 + z, -y, x, 0.0])
+    w, a, b, c = (half / np.linalg.norm(half)).tolist()
+    return w, a, b, c

@@ -62,7 +62,7 @@ def view_scene(
     try:
         panel = window.panel = Panel(window.server, queue)
         panel.for_simulation(session.scene, COMMAND)
-        _list_movable(panel, session)
+        panel.list_movable(session.movable)
         panel.tell_plan(plan_text(session))
         window.floor(scene.ground, scene.domain.size)
         window.clicks()
@@ -161,7 +161,7 @@ def _run(
     panel = window.panel
     assert panel is not None
     shown = session.shown()
-    window.stand(session.camera, np.median(shown.splats.means, axis=0))
+    window.stand(session.camera, np.asarray(shown.splats.means))
     window.show(shown)
     panel.tell(session.message, session.playing)
     tell(window.address)
@@ -193,13 +193,8 @@ def _carry_out(
     if isinstance(session, Session) and isinstance(event, Reset | SetMaterial):
         if isinstance(event, SetMaterial):
             panel.list_numbers(session.scene)
-        _list_movable(panel, session)
+        panel.list_movable(session.movable)
         panel.tell_plan(plan_text(session))
-
-
-def _list_movable(panel: Panel, session: Session) -> None:
-    kinds = {i: session.scene.boundaries[i].type for i in session.movable}
-    panel.list_movable(session.movable, kinds)
 
 
 def _png(pixels: np.ndarray) -> bytes:

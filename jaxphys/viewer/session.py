@@ -148,9 +148,10 @@ class Session:
         return x, y, z
 
     @property
-    def movable(self) -> dict[int, Vector]:
-        """Planes and boxes at rest, by their place in the scene's list, and where they are."""
-        return {i: _vector(one.now) for i, one in self._moved.items()}
+    def movable(self) -> dict[int, Plane | Box]:
+        """Planes and boxes at rest, by their place in the scene's list, where they are now."""
+        listed = self.scene.boundaries
+        return {i: _placed_at(listed[i], one.now) for i, one in self._moved.items()}
 
     def picture(self, camera: Camera) -> np.ndarray:
         """The present frame by our own renderer, as in a film, (H, W, 3) uint8."""

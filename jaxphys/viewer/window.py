@@ -5,6 +5,7 @@ Callbacks run in threads of the server, and only put events into the queue.
 
 import contextlib
 import io
+import math
 from collections import deque
 from typing import Any
 
@@ -14,13 +15,15 @@ from jaxphys.core.errors import InputError
 from jaxphys.core.rotations import quaternion_to_matrix
 from jaxphys.core.splats import Splats
 from jaxphys.mpm.boundaries import Vector
-from jaxphys.render.camera import Camera, position
+from jaxphys.render.camera import Camera
 from jaxphys.scene.scene import Ground
 from jaxphys.viewer.events import Drag, Grab, Poke, Queue
 from jaxphys.viewer.panel import Panel
 from jaxphys.viewer.shown import Shown
 
 HOST = "127.0.0.1"  # and nothing else: whoever reaches the viewer commands it
+FIELD = math.radians(40)  # of view, from top to bottom
+ROOM = 1.3  # of the object's size, from the middle of the view to its end
 KEPT = 400  # frames that curves show
 CLAMPED = 1e4  # of a variance in units of the node, of 6.5e4 that half precision holds
 
@@ -51,7 +54,9 @@ class Window:
         except OSError as error:
             raise InputError(f"--port: {port} cannot be had ({error.strerror})") from None
         self._queue = queue
-        self.server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self.server.gui.configure_theme(
+            control_layout="fixed", show_logo=False, show_share_button=False
+        )
         self.server.scene.set_up_direction("+z")
         self._splats: Any = None
         self._hand: Any = None
@@ -71,16 +76,16 @@ class Window:
 
     # --- the scene ----------------------------------------------------------------------------
 
-    def stand(self, camera: Camera, middle: np.ndarray) -> None:
-        """Lets browsers that come look from a camera, about the point of its axis that is as far
-        as `middle` (3,) [m] is."""
-        eye = np.asarray(position(camera), np.float64)
+    def stand(self, camera: Camera, points: np.ndarray) -> None:
+        """Lets browsers that come look from where a camera looks from, at points (N, 3) [m] and
+        what is around them: a film's camera leaves no room for what hands do."""
+        low, high = np.quantile(points, [0.01, 0.99], axis=0)
+        middle, size = (low + high) / 2, float(np.max(high - low))
         forward = np.asarray(camera.rotation, np.float64)[2]
-        distance = max(float((middle - eye) @ forward), 1e-3)
         first = self.server.initial_camera
-        first.position = eye
-        first.look_at = eye + distance * forward
-        first.fov = 2 * np.arctan(0.5 * camera.height / float(camera.focal[1]))
+        first.look_at = middle
+        first.position = middle - max(ROOM * size / math.tan(FIELD / 2), 1e-3) * forward
+        first.fov = FIELD
 
     def floor(self, ground: Ground | None, size: Vector) -> None:
         """Draws the floor of a scene's domain."""
