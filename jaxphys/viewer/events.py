@@ -77,7 +77,7 @@ class SetNumber:
 
 @dataclass(frozen=True)
 class SetMaterial:
-    """Make an object of something else; begins anew."""
+    """Make an object of something else; begins anew where that is another program."""
 
     thing: int
     material: str

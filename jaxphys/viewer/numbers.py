@@ -52,7 +52,8 @@ def numbers_of(scene: Scene) -> list[Number]:
     for i, thing in enumerate(scene.objects):
         found += [_parameter(i, thing, name) for name in PARAMETERS if _has(thing, name)]
     down = -scene.gravity[2]
-    found.append(Number("gravity", "gravity", "m/s^2", down, 0.0, max(LARGEST_GRAVITY, down)))
+    ends = min(0.0, down), max(LARGEST_GRAVITY, down)
+    found.append(Number("gravity", "gravity", "m/s^2", down, *ends))
     rubs = [one.friction for one in scene.boundaries if _is_rough(one)]
     if rubs:
         most = max(LARGEST_FRICTION, *rubs)

@@ -69,6 +69,7 @@ class Panel:
             self._curves_of(("kinetic", "elastic", "gravity"), "energy [J]")
             self._curves_of(("x", "y", "z"), "momentum [kg m/s]")
         with gui.add_folder("What it takes"):
+            self._step = gui.add_markdown("")
             self._plan = gui.add_markdown("")
             self._film = gui.add_button("Plan the film")
             self._film.on_click(lambda _: queue.put(PlanFilm()))
@@ -157,7 +158,8 @@ class Panel:
 
     def tell(self, message: str, playing: bool) -> None:
         """One line of what went wrong, and whether it plays."""
-        text = f"⚠️ **{message}**" if message else ""
+        # As code: what a file is called must not become markup.
+        text = f"`{message.replace('`', chr(39))}`" if message else ""
         if self._message.content != text:
             self._message.content = text
         if playing != self._playing:
@@ -173,6 +175,10 @@ class Panel:
     def tell_plan(self, text: str) -> None:
         """What running takes, as Markdown."""
         self._plan.content = text
+
+    def tell_step(self, dt: float, steps: int) -> None:
+        """The step [s] that the numbers allow at the start, and how many make a frame."""
+        self._step.content = f"step {dt:.2e} s, {steps} a frame"
 
     def show_picture(self, pixels: np.ndarray) -> None:
         """A picture of our own renderer, (H, W, 3) uint8."""

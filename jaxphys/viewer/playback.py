@@ -2,6 +2,7 @@
 
 import math
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxphys.core.errors import InputError
@@ -68,12 +69,12 @@ def splats_of(moving: Moving, number: int) -> Splats:
     """
     quaternions = np.asarray(moving.quaternions[number], np.float64)
     unit = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
-    axes = np.asarray(quaternion_to_matrix(unit)) * np.exp(moving.log_scales[number])[:, None, :]
+    axes = np.asarray(quaternion_to_matrix(jnp.asarray(unit))) * np.exp(moving.log_scales[number])[:, None, :]
     splats = Splats(
-        np.asarray(moving.means[number], np.float32),
-        (axes @ np.swapaxes(axes, 1, 2)).astype(np.float32),
-        np.asarray(moving.opacities, np.float32),
-        np.asarray(moving.colours, np.float32),
+        jnp.asarray(moving.means[number], jnp.float32),
+        jnp.asarray(axes @ np.swapaxes(axes, 1, 2), jnp.float32),
+        jnp.asarray(moving.opacities, jnp.float32),
+        jnp.asarray(moving.colours, jnp.float32),
     )
     if not all(np.isfinite(part).all() for part in splats):
         raise InputError(f"frame {number}: is not finite; make the run again")

@@ -7,6 +7,7 @@ import io
 import json
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import imageio.v3 as iio
@@ -16,9 +17,10 @@ from jaxphys.core.errors import InputError
 from jaxphys.pipeline.plan import describe, make_plan, memory_text
 from jaxphys.pipeline.replay import replay
 from jaxphys.scene.json import to_json
+from jaxphys.scene.obstacles import located, mesh_file, mesh_obstacles, with_sources
 from jaxphys.scene.scene import Scene
-from jaxphys.scene.source import load_object
-from jaxphys.viewer.events import Event, Picture, PlanFilm, Queue, Reset, SaveScene, SetMaterial
+from jaxphys.scene.source import find, load_object
+from jaxphys.viewer.events import Event, Picture, PlanFilm, Queue, Reset, SaveScene, SetMaterial, Step
 from jaxphys.viewer.panel import Panel
 from jaxphys.viewer.playback import Playback
 from jaxphys.viewer.session import GAUSSIANS, NODES, Session
@@ -52,23 +54,40 @@ def view_scene(
     Raises:
         InputError: the scene cannot be built, or there is no viser or no port.
     """
-    objects = tuple(
-        load_object(thing, beside, scene.seed + i, f"objects[{i}]")
-        for i, thing in enumerate(scene.objects)
-    )
-    session = Session(scene, objects, beside=beside, nodes=nodes, gaussians=gaussians)
     queue = Queue()
-    window = Window(queue, port, "jaxphys view")
+    window = Window(queue, port, "jaxphys view")  # first: what is missing is missing at once
     try:
+        scene = rooted(scene, beside)
+        objects = tuple(
+            load_object(thing, None, scene.seed + i, f"objects[{i}]")
+            for i, thing in enumerate(scene.objects)
+        )
+        session = Session(scene, objects, nodes=nodes, gaussians=gaussians)
         panel = window.panel = Panel(window.server, queue)
         panel.for_simulation(session.scene, COMMAND)
         panel.list_movable(session.movable)
         panel.tell_plan(plan_text(session))
+        panel.tell_step(session.built.simulation.dt, session.built.simulation.steps)
         window.floor(scene.ground, scene.domain.size)
         window.clicks()
         _run(window, queue, session, scene.seconds_per_frame, tell, stop, _Keeper(window, session))
     finally:
         window.stop()
+
+
+def rooted(scene: Scene, beside: Path | None) -> Scene:
+    """The scene with the paths of its files as they are from anywhere, so that it may be saved
+    anywhere; relative ones are looked up beside its file first.
+    """
+    objects = tuple(
+        thing
+        if thing.source is None
+        else replace(thing, source=str(find(thing.source, beside).absolute()))
+        for thing in scene.objects
+    )
+    scene = located(replace(scene, objects=objects), beside)
+    meshes = {i: str(mesh_file(scene, i).absolute()) for i in mesh_obstacles(scene)}
+    return with_sources(scene, meshes)
 
 
 def view_run(
@@ -83,10 +102,10 @@ def view_run(
     Raises:
         InputError: no finished run, or there is no viser or no port.
     """
-    playback = Playback(replay(directory, progress=True))
     queue = Queue()
     window = Window(queue, port, f"jaxphys view {directory.name}")
     try:
+        playback = Playback(replay(directory, progress=True))
         window.panel = Panel(window.server, queue, frames=playback.count)
         window.floor(playback.scene.ground, playback.scene.domain.size)
         seconds = 1 / playback.scene.fps
@@ -100,8 +119,8 @@ def plan_text(session: Session) -> str:
     plan = describe(session.small, session.built)
     grid = " x ".join(map(str, plan.grid))
     lines = [
-        f"**here**: {plan.particles} particles, grid {grid}",
-        f"step {plan.substep:.2e} s, limited by {plan.reason}; {plan.steps_per_frame} a frame",
+        f"**here**: {plan.particles} particles, grid {grid}; steps adapt, from {plan.substep:.2e} s"
+        f" on, limited by {plan.reason}",
         memory_text(plan),
     ]
     return "\n\n".join(lines)
@@ -138,6 +157,7 @@ class _Keeper:
                 text = json.dumps(to_json(session.saved()), indent=2, sort_keys=True) + "\n"
                 window.hand_over(event.client, "scene.json", text.encode())
             case PlanFilm():
+                panel.tell("measuring a second of each stage of the film", session.playing)
                 panel.tell_plan(f"{plan_text(session)}\n\n{film_text(session.saved())}")
             case Picture():
                 pixels = session.picture(window.camera_of(event.client, *PICTURE))
@@ -173,6 +193,7 @@ def _run(
             _carry_out(event, session, panel, keep)
         if session.playing and time.monotonic() >= due:
             due = time.monotonic() + max(seconds, FASTEST)
+            _announce(session, panel)
             session.advance()
         elif not events:
             continue
@@ -189,12 +210,23 @@ def _carry_out(
     except InputError as error:
         session.message = str(error)
         return
+    if isinstance(event, Step):
+        _announce(session, panel)
     session.do(event)
-    if isinstance(session, Session) and isinstance(event, Reset | SetMaterial):
-        if isinstance(event, SetMaterial):
-            panel.list_numbers(session.scene)
-        panel.list_movable(session.movable)
+    if not isinstance(session, Session):
+        return
+    panel.tell_step(session.built.simulation.dt, session.built.simulation.steps)
+    if isinstance(event, SetMaterial):
+        panel.list_numbers(session.scene)
         panel.tell_plan(plan_text(session))
+    if isinstance(event, SetMaterial | Reset):
+        panel.list_movable(session.movable)
+
+
+def _announce(session: Session | Playback, panel: Panel) -> None:
+    """Says why nothing moves for some seconds, where that is so."""
+    if isinstance(session, Session) and session.compiles:
+        panel.tell("compiling the program of this material; some seconds, once", session.playing)
 
 
 def _png(pixels: np.ndarray) -> bytes:

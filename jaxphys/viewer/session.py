@@ -8,7 +8,7 @@ Pokes are `impulse`s of one frame, which a saved scene lists; a hand's pulls are
 """
 
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -30,7 +30,6 @@ from jaxphys.pipeline.frames import Moment, moment_of, retried
 from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import next_capacity, required_pairs
 from jaxphys.scene.build import Built, build, place_objects, validate
-from jaxphys.scene.obstacles import located
 from jaxphys.scene.scene import Scene
 from jaxphys.viewer.events import (
     Drag,
@@ -58,7 +57,7 @@ GAUSSIANS = 8_000
 REACH = 0.15  # of the object's longest side: how far around its place a poke or hand acts
 HAND_SPEED = 1.0  # [m/s], of planes and boxes
 LONGEST_PULL = 0.6  # of the object's longest side
-NOT_YET = {"force": (0.0, 0.0, 0.0), "start": -1.0}
+NOTHING = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -73,9 +72,8 @@ class Session:
     """One scene that runs.
 
     Args:
-        scene: as `animate` takes it.
+        scene: as `animate` takes it, its files named as they are found from here.
         objects: the Gaussians of each object.
-        beside: where relative sources of obstacles are looked up first.
         nodes: of the grid, at most; a finer one is made coarser.
         gaussians: of each object, at most.
 
@@ -89,19 +87,23 @@ class Session:
         camera: that of a film's first picture.
     """
 
+    _poking: Impulse  # of the frame to come, or of one before
+    _pokes: tuple[Impulse, ...]  # all of them, as a scene lists them
+    _hand: Hand
+    _held: int | None  # the particle, in the solver's order
+
     def __init__(
         self,
         scene: Scene,
         objects: tuple[Gaussians, ...],
         *,
-        beside: Path | None = None,
         nodes: int = NODES,
         gaussians: int = GAUSSIANS,
     ):
         validate(scene)
-        self.scene, self._nodes = located(scene, beside), nodes
+        self.scene, self._nodes = scene, nodes
         self.playing, self.message = False, ""
-        self._failed = False
+        self._failed, self._compiled, self._grabs = False, set[Any](), 0
         small = self._small(self.scene)
         self._placed = place_objects(small, tuple(fewer(one, gaussians) for one in objects))
         self._begin()
@@ -128,6 +130,11 @@ class Session:
         """The present frame, of what is drawn."""
         return self._moment.frame
 
+    @property
+    def compiles(self) -> bool:
+        """Whether the next frame has to wait for a program."""
+        return not self._failed and self._program not in self._compiled
+
     def shown(self) -> Shown:
         """What is to be drawn and told of the present frame; finite."""
         return Shown(
@@ -137,6 +144,7 @@ class Session:
             energies=self._energies,
             momentum=tuple(self._moment.metrics["momentum"]),
             held=self.held,
+            grabs=self._grabs,
         )
 
     @property
@@ -221,14 +229,15 @@ class Session:
             return
         model = self._put(self._with_hands())
         state = retried(self._runs(), self._simulation.config, model, self._state)
+        self._compiled.add(self._program)
         number = self._moment.number + 1
         try:
             check(state.status, number)
+            self._arrive(model, state, number)
         except InputError as error:
             self.playing, self._failed = False, True
             self.message = f"{error}; reset to go on"
             return
-        self._arrive(model, state, number)
         step = HAND_SPEED * self._frame_time
         for i, one in self._moved.items():
             self._moved[i] = replace(one, now=_towards(one.now, one.wanted, step))
@@ -254,11 +263,11 @@ class Session:
         size = np.ptp(np.asarray(state.position), axis=1)
         self._size = float(size.max())
         self._reach = max(REACH * self._size, 2 * config.grid.spacing)
-        nowhere = Impulse((0.0, 0.0, 0.0), (self._reach,) * 3, **NOT_YET)
-        self._poking: Boundary = nowhere.prepared(self._setting)
+        reach = self._reach
+        self._poking = Impulse(NOTHING, (reach, reach, reach), NOTHING).prepared(self._setting)
         self._hand = Hand().prepared(self._setting)
-        self._held: int | None = None
-        self._pokes: tuple[Impulse, ...] = ()
+        self._held = None
+        self._pokes = ()
         self._moved = {
             i: Moved(place, place)
             for i, one in enumerate(self.scene.boundaries)
@@ -280,13 +289,14 @@ class Session:
             began[i] = _placed_at(began[i], place)
         built = build(self._small(replace(scene, boundaries=tuple(began))), placed=self._placed)
         self.scene = scene
-        same = jax.tree.structure(built.simulation.model) == jax.tree.structure(
-            self._simulation.model
-        )
-        if same and built.simulation.config == self._simulation.config:
+        if _program_of(built.simulation) == self._program:
             self._built, self._simulation = built, built.simulation
-            return
-        self._begin()
+        else:
+            self._begin()
+
+    @property
+    def _program(self) -> tuple[Any, Any]:
+        return _program_of(self._simulation)
 
     def _put(self, tree):
         """Where the devices want it, so that no frame is a program of its own."""
@@ -340,9 +350,10 @@ class Session:
         chosen = self._setting.in_box(jnp.asarray(rest), jnp.full(3, self._reach))
         mass = float(jnp.sum(jnp.where(chosen, self._simulation.model.mass, 0)))
         force = mass * poke.speed / self._frame_time * along
+        reach = self._reach
         made = Impulse(
             _vector(rest),
-            (self._reach,) * 3,
+            (reach, reach, reach),
             _vector(force),
             start=self._time(),
             duration=self._frame_time,
@@ -356,6 +367,7 @@ class Session:
         points = np.asarray(self._state.position).T
         self._hand = self._hand.holding(points, particle, self._reach)
         self._held, self._from = particle, points[particle].astype(np.float64)
+        self._grabs += 1
 
     def _drag(self, place: np.ndarray) -> None:
         if self._held is None:
@@ -375,6 +387,11 @@ class Session:
         listed[index] = moved
         self.scene = replace(self.scene, boundaries=tuple(listed))
         self._moved[index] = replace(self._moved[index], wanted=place)
+
+
+def _program_of(simulation: Simulation) -> tuple[Any, Any]:
+    """What decides which program steps a simulation, beside shapes."""
+    return simulation.config, jax.tree.structure(simulation.model)
 
 
 _FIELD = {"plane": "point", "box": "centre"}

@@ -19,10 +19,10 @@ class Shown:
 
     Attributes:
         number: of the frame; time: [s].
-        splats: NumPy arrays, as a renderer takes them.
+        splats: as a renderer takes them.
         energies: [J], by name; empty where nobody knows.
         momentum: [kg m/s], or None.
-        held: where the hand holds matter [m], or None.
+        held: where the hand holds matter [m], or None; grabs: how often it has taken hold.
     """
 
     number: int
@@ -31,6 +31,7 @@ class Shown:
     energies: dict[str, float] = field(default_factory=dict)
     momentum: tuple[float, ...] | None = None
     held: Vector | None = None
+    grabs: int = 0
 
 
 def camera_of(scene: Scene, look: Look, frame: Frame) -> Camera:

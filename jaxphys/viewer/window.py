@@ -9,6 +9,7 @@ import math
 from collections import deque
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxphys.core.errors import InputError
@@ -50,7 +51,7 @@ class Window:
         try:
             # It greets on standard output, which belongs to the command's one line.
             with contextlib.redirect_stdout(io.StringIO()):
-                self.server = viser.ViserServer(HOST, port, label=title, verbose=False)
+                self.server: Any = viser.ViserServer(HOST, port, label=title, verbose=False)
         except OSError as error:
             raise InputError(f"--port: {port} cannot be had ({error.strerror})") from None
         self._queue = queue
@@ -60,6 +61,7 @@ class Window:
         self.server.scene.set_up_direction("+z")
         self._splats: Any = None
         self._hand: Any = None
+        self._grab: int | None = None
         self._enlarged = 1.0
         self._curves: deque[tuple[float, ...]] = deque(maxlen=KEPT)
         self._last: int | None = None
@@ -117,7 +119,7 @@ class Window:
         """Draws a frame, at once."""
         with self.server.atomic():
             self._draw(shown.splats)
-            self._draw_hand(shown.held)
+            self._draw_hand(shown)
             if self.panel is not None:
                 self._trace(shown)
                 self.panel.tell_frame(shown.number, shown.time)
@@ -129,6 +131,7 @@ class Window:
             typical = np.sqrt(np.median(np.trace(splats.covariances, axis1=1, axis2=2) / 3))
             self._enlarged = 1 / max(float(typical), 1e-6)
         larger = self._enlarged
+        # Variances of what is far larger than most are cut, where half precision would overflow.
         centres = larger * np.asarray(splats.means, np.float32)
         covariances = np.clip(
             larger**2 * np.asarray(splats.covariances, np.float64), -CLAMPED, CLAMPED
@@ -142,16 +145,19 @@ class Window:
         else:
             self._splats.set_gaussians(centres, covariances, colours, opacities)
 
-    def _draw_hand(self, held: Vector | None) -> None:
-        if held is None:
-            if self._hand is not None:
-                self._hand.remove()
-                self._hand = None
+    def _draw_hand(self, shown: Shown) -> None:
+        """Arrows where matter was grabbed, until it is let go."""
+        wanted = None if shown.held is None else shown.grabs
+        if wanted == self._grab:
             return
         if self._hand is not None:
+            self._hand.remove()
+            self._hand = None
+        self._grab = wanted
+        if shown.held is None:
             return
         self._hand = self.server.scene.add_transform_controls(
-            "/hand", scale=0.3, disable_rotations=True, depth_test=False, position=held
+            "/hand", scale=0.3, disable_rotations=True, depth_test=False, position=shown.held
         )
 
         @self._hand.on_update
@@ -185,13 +191,13 @@ class Window:
             raise InputError("the browser that asked has gone")
         seen = found.camera
         # From the camera's axes, x right and y down, to the world's.
-        outwards = np.asarray(quaternion_to_matrix(np.asarray(seen.wxyz)[None]))[0]
+        outwards = np.asarray(quaternion_to_matrix(jnp.asarray(seen.wxyz)[None]))[0]
         focal = 0.5 * height / np.tan(0.5 * seen.fov)
         return Camera(
-            rotation=np.asarray(outwards.T, np.float32),
-            translation=np.asarray(-outwards.T @ np.asarray(seen.position), np.float32),
-            focal=np.full(2, focal, np.float32),
-            centre=np.array([width / 2, height / 2], np.float32),
+            rotation=jnp.asarray(outwards.T),
+            translation=jnp.asarray(-outwards.T @ np.asarray(seen.position)),
+            focal=jnp.full(2, focal),
+            centre=jnp.array([width / 2, height / 2]),
             width=width,
             height=height,
         )

@@ -72,6 +72,9 @@ def page(browser, address):
     page.on("websocket", lambda socket: page.asked.append(socket.url))
     page.goto(address)
     at(page, 0)
+    # What viser says of this machine's graphics would come and go before the scene.
+    for close in page.locator("[class*=Notification-closeButton]").all():
+        close.click()
     yield page
     page.close()
 
