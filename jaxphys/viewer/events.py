@@ -137,7 +137,7 @@ def _about(event: Event) -> Hashable:
         case MoveBoundary():
             return MoveBoundary, event.index
         case Drag() | Seek():
-            return type(event)
+            return (type(event),)
     return None
 
 

@@ -54,8 +54,8 @@ class Hand(Boundary):
         weight = np.maximum(1 - away, 0) ** 2
         dtype = array_of(self.weight).dtype
         x, y, z = (jnp.asarray(column, dtype) for column in position.T)
-        still = jnp.zeros_like(array_of(self.moved))
-        return replace(self, moved=still, weight=jnp.asarray(weight, dtype), x=x, y=y, z=z)
+        still = self.changed(moved=(0.0, 0.0, 0.0))
+        return replace(still, weight=jnp.asarray(weight, dtype), x=x, y=y, z=z)
 
     def released(self) -> Self:
         """The same holding nothing."""

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from jaxphys.mpm.boundaries import AnyBoundary
 from jaxphys.mpm.materials.catalogue import get_material, material_values
@@ -54,7 +55,7 @@ def numbers_of(scene: Scene) -> list[Number]:
     down = -scene.gravity[2]
     ends = min(0.0, down), max(LARGEST_GRAVITY, down)
     found.append(Number("gravity", "gravity", "m/s^2", down, *ends))
-    rubs = [one.friction for one in scene.boundaries if _is_rough(one)]
+    rubs = [rough for one in scene.boundaries if (rough := _friction(one)) > 0]
     if rubs:
         most = max(LARGEST_FRICTION, *rubs)
         found.append(Number("friction", "friction", "", rubs[0], LEAST_FRICTION, most))
@@ -71,7 +72,7 @@ def with_number(scene: Scene, key: str, value: float) -> Scene:
         return replace(scene, gravity=(*scene.gravity[:2], -value))
     if key == "friction":
         listed = tuple(
-            replace(one, friction=value) if _is_rough(one) else one for one in scene.boundaries
+            _rubbing(one, value) if _friction(one) > 0 else one for one in scene.boundaries
         )
         return replace(scene, boundaries=listed)
     _, place, name = key.split(".")
@@ -96,9 +97,14 @@ def with_material(scene: Scene, i: int, material: str) -> Scene:
     return replace(scene, objects=(*scene.objects[:i], thing, *scene.objects[i + 1 :]))
 
 
-def _is_rough(boundary: AnyBoundary) -> bool:
+def _friction(boundary: AnyBoundary) -> float:
+    """The one coefficient of a boundary; 0: none, or several."""
     friction = getattr(boundary, "friction", None)
-    return isinstance(friction, float | int) and friction > 0
+    return float(friction) if isinstance(friction, float | int) else 0.0
+
+
+def _rubbing(boundary: Any, friction: float) -> Any:
+    return replace(boundary, friction=friction)
 
 
 def _same(thing: Object, name: str) -> set[str]:

@@ -41,9 +41,9 @@ class Panel:
         self._gui, self._scene, self._queue = server.gui, server.scene, queue
         self._message = self._gui.add_markdown("")
         self._at = self._gui.add_markdown("")
+        self._playing = False
         self._play = self._gui.add_button("Play")
         self._play.on_click(lambda _: queue.put(Pause() if self._playing else Play()))
-        self._playing = False
         self._gui.add_button("Step").on_click(lambda _: queue.put(Step()))
         self._gui.add_button("Reset").on_click(lambda _: queue.put(Reset()))
         self._seek = None

@@ -69,7 +69,10 @@ def splats_of(moving: Moving, number: int) -> Splats:
     """
     quaternions = np.asarray(moving.quaternions[number], np.float64)
     unit = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
-    axes = np.asarray(quaternion_to_matrix(jnp.asarray(unit))) * np.exp(moving.log_scales[number])[:, None, :]
+    axes = (
+        np.asarray(quaternion_to_matrix(jnp.asarray(unit)))
+        * np.exp(moving.log_scales[number])[:, None, :]
+    )
     splats = Splats(
         jnp.asarray(moving.means[number], jnp.float32),
         jnp.asarray(axes @ np.swapaxes(axes, 1, 2), jnp.float32),

@@ -20,7 +20,16 @@ from jaxphys.scene.json import to_json
 from jaxphys.scene.obstacles import located, mesh_file, mesh_obstacles, with_sources
 from jaxphys.scene.scene import Scene
 from jaxphys.scene.source import find, load_object
-from jaxphys.viewer.events import Event, Picture, PlanFilm, Queue, Reset, SaveScene, SetMaterial, Step
+from jaxphys.viewer.events import (
+    Event,
+    Picture,
+    PlanFilm,
+    Queue,
+    Reset,
+    SaveScene,
+    SetMaterial,
+    Step,
+)
 from jaxphys.viewer.panel import Panel
 from jaxphys.viewer.playback import Playback
 from jaxphys.viewer.session import GAUSSIANS, NODES, Session

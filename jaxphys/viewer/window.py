@@ -49,8 +49,7 @@ class Window:
                 "the viewer needs viser: pip install 'jaxphys-splats[viewer]'"
             ) from None
         try:
-            # It greets on standard output, which belongs to the command's one line.
-            with contextlib.redirect_stdout(io.StringIO()):
+            with quietly():
                 self.server: Any = viser.ViserServer(HOST, port, label=title, verbose=False)
         except OSError as error:
             raise InputError(f"--port: {port} cannot be had ({error.strerror})") from None
@@ -74,7 +73,8 @@ class Window:
 
     def stop(self) -> None:
         """Closes the server."""
-        self.server.stop()
+        with quietly():
+            self.server.stop()
 
     # --- the scene ----------------------------------------------------------------------------
 
@@ -207,6 +207,11 @@ class Window:
         found = self.server.get_clients().get(client)
         if found is not None:
             found.send_file_download(name, content)
+
+
+def quietly() -> contextlib.AbstractContextManager:
+    """Viser says that it starts and stops on standard output, which is the command's."""
+    return contextlib.redirect_stdout(io.StringIO())
 
 
 def _vector(array: np.ndarray) -> Vector:

@@ -19,7 +19,7 @@ pytest.importorskip("viser", reason="VISER IS NOT INSTALLED: no viewer was opene
 
 # Viser's own, of the quads that carry any splats: they have no places on the host.
 KNOWN = "computeBoundingSphere(): Computed radius is NaN"
-MOVED = 2.0  # of 255, on the average over the picture
+MOVED = 1.0  # of 255, on the average over the picture
 
 browser = pytest.fixture(scope="module")(started)
 
@@ -75,6 +75,7 @@ def page(browser, address):
     # What viser says of this machine's graphics would come and go before the scene.
     for close in page.locator("[class*=Notification-closeButton]").all():
         close.click()
+    page.wait_for_timeout(2000)
     yield page
     page.close()
 
@@ -119,7 +120,7 @@ def test_frames_differ_and_the_same_frame_does_not(page):
     assert apart(first, later) > MOVED
     press(page, "Reset")
     at(page, 0)
-    assert apart(first, seen(page)) < 0.1 * MOVED
+    assert apart(first, seen(page)) < 0.3 * MOVED
 
 
 def test_it_plays_and_pauses(page):
@@ -131,15 +132,15 @@ def test_it_plays_and_pauses(page):
 
 
 def test_a_click_pokes(page):
-    still = forward(page, 4)
+    still = forward(page, 8)
     press(page, "Reset")
     at(page, 0)
     page.mouse.click(SCENE["width"] // 2, SCENE["height"] // 2)
     page.wait_for_timeout(500)
-    for number in range(1, 5):
+    for number in range(1, 9):
         press(page, "Step")
         page.wait_for_selector(f"text=/^frame {number},/", timeout=120_000)
-    at(page, 4)
+    at(page, 8)
     assert apart(still, seen(page)) > MOVED
 
 
