@@ -23,6 +23,7 @@ from jaxphys.cli.page import page
 from jaxphys.cli.priors import priors
 from jaxphys.cli.reconstruct import reconstruct
 from jaxphys.cli.study import study
+from jaxphys.cli.view import view
 from jaxphys.core.errors import InputError, one_line
 
 FAULT, REFUSED, INTERRUPTED, UNHEARD = 1, 2, 130, 141
@@ -40,6 +41,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "materials": commands.materials,
     "priors": priors,
     "evaluate": evaluate,
+    "view": view,
     "page": page,
     "study": study,
     "weights": weights.weights,

@@ -20,7 +20,7 @@ from jaxphys.mpm.loop.window import windowed
 from jaxphys.mpm.materials.fracture import number_of_pieces
 from jaxphys.mpm.motion import Frame, Motion, join
 from jaxphys.mpm.simulation import Simulation
-from jaxphys.mpm.state import LEFT_WINDOW, OK, Config, State
+from jaxphys.mpm.state import LEFT_WINDOW, OK, Config, Model, State
 from jaxphys.pipeline.output import Timing
 
 # How often a frame that fails is tried again with half the time step.
@@ -68,7 +68,8 @@ def _rounded(value: np.ndarray):
     return float(str(np.float32(value)))
 
 
-def _moment(simulation: Simulation, state: State, number: int, particles: Array | None) -> Moment:
+def moment_of(simulation: Simulation, state: State, number: int, particles: Array | None) -> Moment:
+    """A state of a simulation as frame `number`; particles: as `frames` takes them."""
     frame, sums = jax.device_get(_look(simulation, state, particles))
     row = {"frame": number, "time": _rounded(frame.time), "steps": int(frame.status.taken)}
     row |= {name: _rounded(np.asarray(value)) for name, value in sums.items()}
@@ -89,6 +90,26 @@ def wider(config: Config) -> list[Config]:
     if config.window is not None:
         found.append(replace(config, slabs=None, window=None))
     return found
+
+
+def retried(simulation: Simulation, config: Config, model: Model, before: State) -> State:
+    """The state a frame later, tried again as `frames` says; where all fails, `before` with the
+    status of the last failure.
+
+    Args:
+        config, model: of the simulation, see `mpm.loop.frames.next_frame`.
+    """
+    program, refinements = config, 0 if simulation.given_substep is not None else REFINEMENTS
+    for refinement in range(refinements + 1):
+        state = next_frame(simulation, program, model, before, refinement)
+        for more in wider(program):
+            if int(state.status.code) != LEFT_WINDOW:
+                break
+            program = more
+            state = next_frame(simulation, program, model, before, refinement)
+        if int(state.status.code) == OK:
+            break
+    return state
 
 
 def frames(
@@ -121,7 +142,7 @@ def frames(
     if start is None:
         start = 0, simulation.state
         check(simulation.state.status, 0)
-        yield _moment(simulation, simulation.state, 0, particles)
+        yield moment_of(simulation, simulation.state, 0, particles)
     number, state = start
     config, model = simulation.config, simulation.model
     slabs = slabs_for(simulation.stepping)
@@ -133,28 +154,14 @@ def frames(
         # Where the frames leave it, so that the first one is no program of its own.
         model, state = jax.device_put((model, state), config.placement.everywhere())
 
-    def advance(config: Config, state: State, refinement: int | None) -> State:
-        return next_frame(simulation, config, model, state, refinement)
-
     with timing.stage("simulate"), timing.compiling("simulate"):
-        jax.block_until_ready(advance(cut(config, state), state, None))
-    refinements = 0 if simulation.given_substep is not None else REFINEMENTS
+        jax.block_until_ready(next_frame(simulation, cut(config, state), model, state, None))
     while True:
         number += 1
         with timing.stage("simulate"):
-            before = state
-            program = cut(config, before)
-            for refinement in range(refinements + 1):
-                state = advance(program, before, refinement)
-                for more in wider(program):
-                    if int(state.status.code) != LEFT_WINDOW:
-                        break
-                    program = more
-                    state = advance(program, before, refinement)
-                if int(state.status.code) == OK:
-                    break
+            state = retried(simulation, cut(config, state), model, state)
             check(state.status, number)
-            moment = _moment(simulation, state, number, particles)
+            moment = moment_of(simulation, state, number, particles)
         yield moment
 
 
