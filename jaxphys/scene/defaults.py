@@ -102,9 +102,13 @@ def _sand(domain: Domain) -> Scene:
         material="sand",
         size=size,
         centre=_above(0.05, size),
-        filling=Filling(show=True),
+        # As fine inside as the skin's grains, which it is seen between.
+        filling=Filling(show=True, per_cell=4),
+        # Of one colour a heap has no surface to be seen.
+        grain=0.3,
     )
-    return _scene(thing, domain, friction=0.7, splats_follow="elastic")
+    # It lies still after a second.
+    return _scene(thing, domain, friction=0.7, splats_follow="elastic", frames=30)
 
 
 def _fracture(domain: Domain) -> Scene:

@@ -1,6 +1,7 @@
 """Objects put where a scene wants them: chosen, turned, scaled, moved, filled."""
 
 import math
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -20,7 +21,7 @@ from jaxphys.gaussians.gaussians import (
     select,
     transform,
 )
-from jaxphys.gaussians.harmonics import dc_to_rgb
+from jaxphys.gaussians.harmonics import dc_to_rgb, rgb_to_dc
 from jaxphys.gaussians.hull import GAP, surface_spacing
 from jaxphys.gaussians.lone import lone_points
 from jaxphys.gaussians.relax import blue_noise
@@ -35,6 +36,8 @@ RELAX_STEPS = 40
 SIZE_OVER_SPACING = 0.4
 SMALLEST = 0.25
 OPACITY = 0.95
+# Of grains: as wide as this times what they are drawn of, so that they are told from each other.
+GRAIN_SIZE = 0.5
 # A splat of opacity 0.95 is fainter than 1/255 from so many of its standard deviations on.
 VISIBLE = 3.3
 # Splats farther apart than this many times the usual distance, and than a cell of the grid, do not
@@ -132,8 +135,12 @@ def place(
     _require_inside(np.asarray(moving.means) + centre, grid, kernel, where)
     filled = _fill(moving, thing, grid, seed, where)
     filling, volumes = filled.points, filled.volumes
+    if thing.grain > 0:
+        moving, still = _round(moving), _round(still)
     if thing.filling is not None and thing.filling.show and len(filling):
         moving, filling = concatenate([moving, _shown(filling, moving, thing, grid)]), filling[:0]
+    if thing.grain > 0:
+        moving, still = (_shaded(part, thing.grain, seed) for part in (moving, still))
     moving, still = (transform(part, translation=centre) for part in (moving, still))
     filling = (filling + centre).astype(moving.means.dtype)
     placement = Placement.of(rotation, scale, middle, centre)
@@ -194,6 +201,24 @@ def _shown(points: np.ndarray, moving: Gaussians, thing: Object, grid: Grid) -> 
     # What does not fit even so is faint: the renderer draws no splat smaller than a pixel.
     opacity = OPACITY * np.minimum(fits / sizes, 1) ** 2
     return from_points(points.astype(moving.means.dtype), colours, sizes, opacity=opacity)
+
+
+def _round(gaussians: Gaussians) -> Gaussians:
+    """Grains in place of Gaussians: round ones, of their middle axis."""
+    middle = jnp.median(gaussians.log_scales, axis=1, keepdims=True) + math.log(GRAIN_SIZE)
+    return replace(gaussians, log_scales=jnp.broadcast_to(middle, gaussians.log_scales.shape))
+
+
+def _shaded(gaussians: Gaussians, grain: float, seed: int) -> Gaussians:
+    """The Gaussians, each darker by a share of its own, up to `grain`. None gets lighter, so that
+    no colour leaves [0, 1].
+    """
+    # A stream of its own: the filling's places come from the seed alone.
+    darker = grain * np.random.default_rng([seed, 1]).random(gaussians.count)
+    kept = jnp.asarray(1 - darker, gaussians.harmonics.dtype)[:, None]
+    base = rgb_to_dc(kept * dc_to_rgb(gaussians.harmonics[:, 0]))
+    rest = kept[:, None] * gaussians.harmonics[:, 1:]
+    return replace(gaussians, harmonics=jnp.concatenate([base[:, None], rest], axis=1))
 
 
 def _numbers(values) -> str:

@@ -120,6 +120,8 @@ class Object(Checked):
             moves; null: all.
         filling: null leaves the object hollow.
         splats: number of Gaussians made where the source is a mesh.
+        grain: above 0 every Gaussian is drawn as a grain: round, half as wide, and darker by a
+            random share of its brightness up to this one.
     """
 
     source: str | None = None
@@ -139,6 +141,7 @@ class Object(Checked):
     area: Area | None = field(default=None, metadata=PLACE)
     filling: Filling | None = field(default_factory=Filling)
     splats: int = field(default=20_000, metadata=between(1, MOST_SPLATS))
+    grain: float = field(default=0.0, metadata=between(0, 1))
 
 
 @dataclass(frozen=True)

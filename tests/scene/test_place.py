@@ -7,6 +7,7 @@ import trimesh
 
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import Gaussians, concatenate, from_points, to_splats
+from jaxphys.gaussians.harmonics import dc_to_rgb
 from jaxphys.gaussians.surface import gaussians_from_mesh
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.transfer.kernels import QUADRATIC
@@ -97,6 +98,34 @@ def test_a_drawn_filling_is_not_seen_before_the_object_comes_apart():
     points = jnp.asarray(plain_look.filling)
     blocks = concatenate([plain_look.moving, from_points(points, np.ones(3), 0.4 * SPACING / 2)])
     assert np.abs(pictures(blocks) - pictures(plain_look.moving)).max() > 0.2
+
+
+def test_grains_are_round_and_each_darker_by_a_share_of_its_own():
+    thing = dataclasses.replace(THING, filling=Filling(show=True))
+    even, grained, again = (
+        put(dataclasses.replace(thing, grain=grain)) for grain in (0.0, 0.4, 0.4)
+    )
+    before, after = (np.asarray(dc_to_rgb(one.moving.harmonics[:, 0])) for one in (even, grained))
+    lit = before > 0.5  # a channel of the cone is on or off
+    kept = np.where(lit, after / np.where(lit, before, 1), np.nan)
+    assert np.nanmin(kept) >= 0.6 - 1e-5 and np.nanmax(kept) <= 1 + 1e-5
+    np.testing.assert_allclose(after[~lit], 0, atol=1e-3)
+    # The same for every channel of one, and spread evenly over all of them.
+    assert (
+        np.ptp(np.nan_to_num(kept, nan=np.nanmin(kept, axis=1, keepdims=True)), axis=1).max() < 1e-4
+    )
+    assert np.std(kept[:, 2]) == pytest.approx(0.4 / np.sqrt(12), rel=0.05)
+    # The cone's discs are round grains now, half as wide; what fills it was round already.
+    discs, width = 2000, np.median(even.moving.log_scales, axis=1, keepdims=True)
+    expected = np.broadcast_to(
+        width - np.log(2) * (np.arange(len(width)) < discs)[:, None], (len(width), 3)
+    )
+    np.testing.assert_allclose(grained.moving.log_scales, expected, atol=1e-5)
+    assert np.ptp(np.asarray(even.moving.log_scales)[:discs], axis=1).min() > 1
+    for name in ("means", "opacity_logits"):
+        np.testing.assert_array_equal(getattr(grained.moving, name), getattr(even.moving, name))
+    np.testing.assert_array_equal(grained.volumes, even.volumes)
+    np.testing.assert_array_equal(again.moving.harmonics, grained.moving.harmonics)
 
 
 def test_lone_splats_are_left_out_and_hollow_things_kept():
