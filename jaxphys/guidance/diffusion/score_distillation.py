@@ -163,8 +163,8 @@ def guided_estimate(
     others = negatives.conditions if negatives is not None else ()
     asked = (condition, unconditional, *others)
     every = jax.tree.map(lambda *parts: jnp.concatenate(parts), *asked)
-    repeated = (jnp.concatenate([part] * len(asked)) for part in (noisy, time))
-    told, untold, *unwanted = jnp.split(prior(*repeated, every), len(asked))
+    places, times = (jnp.concatenate([part] * len(asked)) for part in (noisy, time))
+    told, untold, *unwanted = jnp.split(prior(places, times, every), len(asked))
     if negatives is None:
         steered_by = guided(told, untold, config.guidance)
     else:
