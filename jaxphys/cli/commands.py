@@ -34,6 +34,9 @@ def generate(
     prior: str | None = None,
     shape_prior: str | None = None,
     negative: str | None = None,
+    stages: Literal["one", "two"] | None = None,
+    distillation: Literal["sds", "ism"] | None = None,
+    perp_neg: bool = False,
     refiner: Literal["auto", "endpoint", "local", "rules"] | None = None,
     precision: Literal["bfloat16", "float32"] | None = None,
     attention_slice: int | None = None,
@@ -64,7 +67,12 @@ def generate(
             stable-diffusion-2.1, or a folder in diffusers' layout. Or library: no prior, but the
             parametric model that the words mean; `jaxphys priors` lists them. Default: bundled.
         shape_prior: Judges points: bundled, point-e, or a folder with its files. Default: bundled.
-        negative: What Stable Diffusion moves away from.
+        negative: What the prior that judges pictures moves away from.
+        stages: Two, geometry under both priors and then appearance under the one that judges
+            pictures; or one. Default: two for Stable Diffusion, one for bundled.
+        distillation: Draw the noise that pictures are judged with (sds) or find it by inversion
+            (ism), which costs more than three times as much. Default: sds.
+        perp_neg: Move away from views that a picture must not show, at twice the cost.
         refiner: Who refines the sentence. Default: auto, an endpoint if one is set up, else a
             local language model if there is one, else fixed rules.
         precision: Of a published prior. Default: bfloat16.
@@ -98,6 +106,9 @@ def generate(
         prior=prior,
         shape_prior=shape_prior,
         negative=negative,
+        stages=stages,
+        distillation=distillation,
+        perp_neg=perp_neg or None,
         refiner=refiner,
         precision=precision,
         attention_slice=attention_slice,

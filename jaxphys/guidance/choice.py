@@ -3,15 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 from jaxphys.core.errors import InputError, nearest
 from jaxphys.guidance.bundled.pixel_guide import bundled_image_guide
 from jaxphys.guidance.bundled.priors import require_prior
 from jaxphys.guidance.bundled.shape_guide import bundled_shape_guide, shape_weights
-from jaxphys.guidance.diffusion.score_distillation import DistillationConfig
+from jaxphys.guidance.diffusion.score_distillation import DistillationConfig, Method
 from jaxphys.guidance.guides import Guides, ImageGuide, ShapeGuide
 from jaxphys.guidance.optimise import OptimiseConfig
 from jaxphys.guidance.published import point_e_guide, stable_diffusion
+from jaxphys.guidance.stages import Stage, two
 from jaxphys.weights.catalogue import CATALOGUE
 from jaxphys.weights.resolve import locate
 
@@ -21,7 +23,7 @@ POINT_E = "point-e"
 STABLE_DIFFUSION = ("stable-diffusion-1.5", "stable-diffusion-2.1-base", "stable-diffusion-2.1")
 
 # What GSGEN's released configuration does, in lengths of the object and weights relative to the
-# image loss: guidance 100, noise levels from 0.98 down, the 3D prior for the first part only.
+# image loss: guidance 100, noise levels from 0.98 down, and the paper's two stages.
 LATENT = OptimiseConfig(
     count=4096,
     steps=5000,
@@ -29,13 +31,15 @@ LATENT = OptimiseConfig(
     image=DistillationConfig(
         guidance=100.0, rescale=0.0, weight="sigma_squared", time=(0.02, 0.98, 0.5), limit=None
     ),
-    shape_until=0.15,
-    rates=(
-        ("means", 3e-3),
-        ("log_scales", 3e-3),
-        ("quaternions", 3e-3),
-        ("opacity_logits", 3e-3),
-        ("harmonics", 1e-2),
+    stages=two(
+        0.15,
+        (
+            ("means", 3e-3),
+            ("log_scales", 3e-3),
+            ("quaternions", 3e-3),
+            ("opacity_logits", 3e-3),
+            ("harmonics", 1e-2),
+        ),
     ),
     density_every=500,
 )
@@ -43,11 +47,37 @@ POINT_E_DISTILLATION = DistillationConfig(
     guidance=100.0, rescale=0.0, weight="sigma_squared", time=(0.02, 0.98, 0.98)
 )
 POINT_E_WEIGHT = 0.04
+# The first of two stages' share of the steps for the bundled priors, whose runs are short.
+BUNDLED_GEOMETRY = 0.5
 
 
-def settings(prior: str, shape_prior: str) -> OptimiseConfig:
-    """How to optimise with a 2D and a 3D prior, given by name or folder."""
+def settings(
+    prior: str,
+    shape_prior: str,
+    *,
+    stages: Literal["one", "two"] | None = None,
+    distillation: Method = "sds",
+    perp_neg: bool = False,
+) -> OptimiseConfig:
+    """How to optimise with a 2D and a 3D prior, given by name or folder.
+
+    Args:
+        stages: "two" as the paper has them, see `stages.two`, or "one" with everything at once;
+            None: two for published 2D priors, one for the bundled one.
+        distillation, perp_neg: of the 2D prior, see `DistillationConfig`. "ism" takes its authors'
+            guidance and weight where the prior is a published one.
+    """
     config = OptimiseConfig() if prior == BUNDLED else LATENT
+    first = config.stages[0]
+    if stages == "one":
+        config = replace(config, stages=(Stage(rates=first.rates),))
+    elif stages == "two":
+        share = BUNDLED_GEOMETRY if prior == BUNDLED else first.share
+        config = replace(config, stages=two(share, first.rates))
+    image = replace(config.image, method=distillation, perp_neg=perp_neg)
+    if distillation == "ism" and prior != BUNDLED:
+        image = replace(image, guidance=7.5, weight="clean")
+    config = replace(config, image=image)
     if shape_prior != BUNDLED:
         config = replace(
             config,
@@ -118,7 +148,7 @@ def image_guide(
 ) -> ImageGuide:
     """The 2D prior of a name or folder, told a refined prompt. Raises InputError as `require`."""
     if prior == BUNDLED:
-        return bundled_image_guide(prompt)
+        return bundled_image_guide(prompt, negative)
     return stable_diffusion.stable_diffusion_guide(
         prompt,
         image_folder(prior, dtype=dtype),

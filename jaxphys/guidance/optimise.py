@@ -1,8 +1,8 @@
 """From a sentence to 3D Gaussians: a cloud from the point prior, refined by score distillation.
 
-As GSGEN (Chen et al. 2024): points first, then Gaussians moved by the 2D and the 3D prior together.
-The 3D prior judges the centres in its own frame, which is the object's here: nothing is placed,
-turned or scaled before it is done.
+As GSGEN (Chen et al. 2024): points first, then Gaussians moved by the 2D and the 3D prior, in one
+or more stages (`stages.py`). The 3D prior judges the centres in its own frame, which is the
+object's here: nothing is placed, turned or scaled before it is done.
 """
 
 import math
@@ -20,6 +20,7 @@ from jax import Array
 from tqdm import tqdm
 
 from jaxphys.core.errors import InputError
+from jaxphys.gaussians.compact import close_gaps
 from jaxphys.gaussians.density import DensityConfig, carry_moments, control_density, with_capacity
 from jaxphys.gaussians.gaussians import Gaussians, from_points, select
 from jaxphys.gaussians.harmonics import dc_to_rgb
@@ -31,6 +32,7 @@ from jaxphys.guidance.clouds import even_subset
 from jaxphys.guidance.diffusion.score_distillation import DistillationConfig
 from jaxphys.guidance.guides import Guides
 from jaxphys.guidance.pictures import neighbour_sizes, room_for_pairs, view_picture
+from jaxphys.guidance.stages import ONE, Stage, ends, stage_at, stepwise
 from jaxphys.guidance.surfaces import surface_of_cloud
 from jaxphys.render import next_capacity
 
@@ -49,11 +51,11 @@ class OptimiseConfig:
         views: pictures a step.
         image, shape: of the two distillations.
         image_weight, shape_weight, regular_weight: of the losses.
-        shape_until: progress in [0, 1] at which the 3D prior has said what it can.
-        rates: learning rate by field of `Gaussians`, at the start; falls to a tenth.
+        stages: parts of the optimisation, one after another: what each asks and learns.
         size, opacity: Gaussians start with `size` times the distance to their nearest neighbours.
         largest: standard deviations above are pulled back.
-        density_every: steps between two rounds of density control; 0 for none.
+        density_every: steps between two rounds of density control, in stages that have it; 0 for
+            none.
     """
 
     count: int = 2048
@@ -72,14 +74,7 @@ class OptimiseConfig:
     image_weight: float = 1.0
     shape_weight: float = 0.5
     regular_weight: float = 1.0
-    shape_until: float = 1.0
-    rates: tuple[tuple[str, float], ...] = (
-        ("means", 4e-4),
-        ("log_scales", 6e-3),
-        ("quaternions", 6e-3),
-        ("opacity_logits", 2e-2),
-        ("harmonics", 1.5e-2),
-    )
+    stages: tuple[Stage, ...] = ONE
     size: float = 0.7
     opacity: float = 0.85
     largest: float = 0.04
@@ -89,6 +84,10 @@ class OptimiseConfig:
             gradient_threshold=3.0, split_size=0.02, least_opacity=0.02, largest_size=0.15
         )
     )
+
+    def __post_init__(self):
+        if not self.stages:
+            raise InputError("stages: an optimisation needs at least one")
 
 
 class OptimiseState(NamedTuple):
@@ -120,14 +119,15 @@ def surface_gaussians(guides: Guides, key: Array, config: OptimiseConfig) -> Gau
 
 
 def _transform(config: OptimiseConfig) -> optax.GradientTransformation:
-    steps = max(config.steps, 1)
-    groups = {
-        name: optax.adam(optax.exponential_decay(rate, steps, 0.1), eps=1e-15)
-        for name, rate in config.rates
-    }
-    names: dict[str, Any] = {name: name for name, _ in config.rates}
-    labels = Gaussians(**names)
-    return optax.multi_transform(groups, labels)
+    """Adam. Rates fall to a tenth over all steps, in whatever stages these are."""
+    steps, groups = max(config.steps, 1), {}
+    for name, _ in config.stages[0].rates:
+        rates = [dict(stage.rates)[name] for stage in config.stages]
+        decays = [optax.exponential_decay(rate, steps, 0.1) for rate in rates]
+        rate = stepwise(decays, ends(config.stages, steps))
+        groups[name] = optax.adam(rate, eps=1e-15)
+    names: dict[str, Any] = {name: name for name in groups}
+    return optax.multi_transform(groups, Gaussians(**names))
 
 
 def start(gaussians: Gaussians, config: OptimiseConfig) -> OptimiseState:
@@ -187,13 +187,15 @@ def advance(
             shape = guides.shape.distil(means, colours, shape_key, config.shape, progress)
             return shape.value / (6 * config.count)
 
-        if config.shape_until < 1:
-            wanted = progress < config.shape_until
+        asked = {stage.shape for stage in config.stages}
+        if asked == {True, False}:
+            answers = [lambda _, stage=stage: stage.shape for stage in config.stages]
+            wanted = stepwise(answers, ends(config.stages, config.steps))(state.step)
             nothing = jnp.zeros_like(value)
             shape_value = jax.lax.cond(wanted, judged, lambda _: nothing, gaussians)
-        else:
-            shape_value = judged(gaussians)
-        value = value + config.shape_weight * shape_value
+            value = value + config.shape_weight * shape_value
+        elif asked == {True}:
+            value = value + config.shape_weight * judged(gaussians)
         value = value + config.regular_weight * regularity(gaussians, state.alive, config)
         return value, overflow.any()
 
@@ -224,6 +226,16 @@ def adapt(state: OptimiseState, key: Array, config: OptimiseConfig) -> OptimiseS
     )
 
 
+def tighten(state: OptimiseState) -> OptimiseState:
+    """Gaussians in the gaps between others, see `close_gaps`; not for use inside jit."""
+    update = close_gaps(state.gaussians, state.alive)
+    return state._replace(
+        gaussians=update.gaussians,
+        alive=update.alive,
+        optimiser=carry_moments(update, state.optimiser),
+    )
+
+
 def optimise(
     guides: Guides,
     state: OptimiseState,
@@ -251,7 +263,9 @@ def optimise(
             state = following
             step = int(state.step)
             if config.density_every and step % config.density_every == 0 and step < config.steps:
-                state = adapt(state, key, config)
+                density = stage_at(config.stages, config.steps, step).density
+                state = adapt(state, key, config) if density != "none" else state
+                state = tighten(state) if density == "compact" else state
             if on_step is not None:
                 on_step(state)
             bar.update()

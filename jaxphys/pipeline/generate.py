@@ -154,7 +154,13 @@ def _optimise(
     splats = generation.splats
     given = {"steps": generation.steps, "count": splats, "surface": splats}
     changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    usual = choice.settings(generation.prior, generation.shape_prior)
+    usual = choice.settings(
+        generation.prior,
+        generation.shape_prior,
+        stages=generation.stages,
+        distillation=generation.distillation,
+        perp_neg=generation.perp_neg,
+    )
     config = dataclasses.replace(usual, **changes)
     guides = choice.guides(
         prompt,

@@ -205,7 +205,15 @@ class Generation(Checked):
             "stable-diffusion", or a folder in diffusers' layout; or "library", the parametric model
             that the sentence names instead of any prior.
         shape_prior: the 3D prior: "bundled", "point-e", or a folder with Point-E's files.
-        negative: what the 2D prior moves away from; bundled priors do not read it.
+        negative: what the 2D prior moves away from; the 3D priors do not read it.
+        stages: "two", as the paper has them: geometry under both priors, then appearance under the
+            2D prior alone with densification; or "one", all of it at once. null: two for a
+            published 2D prior, one for the bundled one.
+        distillation: where the noise comes from with which the 2D prior judges pictures: "sds"
+            draws it, "ism" (interval score matching) finds it by inversion, at more than three
+            times the cost.
+        perp_neg: whether pictures move away from the views that they must not show (Perp-Neg), at
+            twice the cost.
         refiner: who refines the sentence; "auto" asks an endpoint, then a local model, then rules.
         precision: of a published prior's weights and computation.
         attention_slice: queries that a published prior attends from at a time; null: all.
@@ -217,6 +225,9 @@ class Generation(Checked):
     prior: str = "bundled"
     shape_prior: str = "bundled"
     negative: str = ""
+    stages: Literal["one", "two"] | None = None
+    distillation: Literal["sds", "ism"] = "sds"
+    perp_neg: bool = False
     refiner: Literal["auto", "endpoint", "local", "rules"] = "auto"
     precision: Literal["bfloat16", "float32"] = "bfloat16"
     attention_slice: int | None = field(default=1024, metadata=between(1, 1_000_000))

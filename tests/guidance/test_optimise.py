@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import NamedTuple
 
 import jax
@@ -15,9 +16,12 @@ from jaxphys.guidance.bundled.point_prior import PointPrior, PointPriorConfig
 from jaxphys.guidance.guides import Guides
 from jaxphys.guidance.optimise import OptimiseConfig, draw_views, optimise, start, text_to_gaussians
 from jaxphys.guidance.pictures import neighbour_sizes, view_picture
+from jaxphys.guidance.stages import RATES, Stage, two
 from jaxphys.guidance.views import ELEVATIONS
 
 CONFIG = OptimiseConfig(count=24, room=1.5, steps=4, views=2, density_every=2)
+# Two steps of geometry, six of appearance; rounds of density control before steps 2, 4 and 6.
+TWO = replace(CONFIG, steps=8, room=3.0, stages=two(0.25))
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +66,58 @@ def test_resumed_run_ends_in_the_same_bytes(guides):
     assert np.abs(after.means - before.means).max() > 1e-4
     assert after.means.dtype == jnp.float32
     assert after.count == 36 and int(through.alive.sum()) >= 24
+
+
+@pytest.fixture(scope="module")
+def in_two_stages(guides):
+    """Every state of a run, its end, and its key; states[k] is the one after k + 1 steps."""
+    key, states = jax.random.key(0), []
+    end = optimise(guides, start(cloud(), TWO), key, TWO, on_step=states.append)
+    return states, end, key
+
+
+@pytest.mark.parametrize("after", [1, 2, 5])
+def test_two_stages_resume_to_the_same_bytes(guides, in_two_stages, after):
+    """Interrupted within geometry, at its end and within appearance."""
+    states, end, key = in_two_stages
+    resumed = optimise(guides, states[after - 1], key, TWO)
+    for a, b in zip(jax.tree.leaves(end), jax.tree.leaves(resumed), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_stages_ask_what_they_say(guides, in_two_stages):
+    """How much the 3D prior counts decides geometry and leaves appearance alone."""
+    states, end, key = in_two_stages
+    louder = replace(TWO, shape_weight=50.0)
+    optimise(guides, start(cloud(), louder), key, louder, on_step=(kept := []).append)
+    assert np.abs(kept[0].gaussians.means - states[0].gaussians.means).max() > 0
+    later = optimise(guides, states[1], key, louder)
+    for a, b in zip(jax.tree.leaves(end), jax.tree.leaves(later), strict=True):
+        np.testing.assert_array_equal(a, b)
+    # Geometry keeps the Gaussians; the first round of appearance closes gaps.
+    assert int(states[0].alive.sum()) == 24 and int(states[1].alive.sum()) > 24
+
+
+def test_a_rate_of_zero_keeps_a_field(guides):
+    frozen = tuple((name, 0.0 if name == "means" else rate) for name, rate in RATES)
+    stages = (Stage(0.5, density="none"), Stage(0.5, shape=False, density="none", rates=frozen))
+    config = replace(CONFIG, stages=stages)
+    begun = start(cloud(), config)
+    optimise(guides, begun, jax.random.key(0), config, on_step=(states := []).append)
+    means = [state.gaussians.means for state in states]
+    assert np.abs(means[0] - begun.gaussians.means).max() > 1e-4
+    assert np.abs(means[1] - means[0]).max() > 1e-4
+    np.testing.assert_array_equal(means[3], means[1])
+    moved = states[3].gaussians.log_scales - states[1].gaussians.log_scales
+    assert np.abs(moved).max() > 1e-4
+
+
+def test_interval_score_matching_reaches_the_gaussians(guides):
+    usual, key = replace(CONFIG, steps=1), jax.random.key(0)
+    config = replace(usual, image=replace(CONFIG.image, method="ism", inversion=2))
+    found, usual = (optimise(guides, start(cloud(), c), key, c) for c in (config, usual))
+    means = found.gaussians.means
+    assert np.isfinite(means).all() and np.abs(means - usual.gaussians.means).max() > 0
 
 
 def test_without_distillation_the_surface_is_the_result(guides):

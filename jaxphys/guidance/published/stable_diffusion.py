@@ -15,6 +15,7 @@ from flax import nnx
 from jax import Array
 
 from jaxphys.core.files import read_json
+from jaxphys.guidance.diffusion.perp_neg import Negatives
 from jaxphys.guidance.diffusion.schedule import Kind
 from jaxphys.guidance.diffusion.score_distillation import (
     Distillation,
@@ -22,6 +23,7 @@ from jaxphys.guidance.diffusion.score_distillation import (
     score_distillation,
 )
 from jaxphys.guidance.published.scheduler_config import SchedulerConfig
+from jaxphys.guidance.view_prompts import OVERHEAD, away_from_front, unwanted_views, view_mixture
 from jaxphys.networks import autoencoder, clip_text, unet
 from jaxphys.networks.clip_tokenizer import ClipTokenizer
 from jaxphys.networks.parameters import fill
@@ -29,7 +31,6 @@ from jaxphys.weights.safetensors_files import open_arrays
 
 PARTS = ("tokenizer", "text_encoder", "unet", "vae", "scheduler")
 VIEWS = ("front view", "side view", "back view", "overhead view")
-OVERHEAD = jnp.pi / 3  # elevation from which a view is one from above; GSGEN's rule
 
 
 class TextStates(NamedTuple):
@@ -94,9 +95,17 @@ class StableDiffusionGuide(NamedTuple):
         keys = jax.random.split(encode_key, images.shape[0])
         # One picture at a time: what the encoder computes at 512 x 512 is the largest of all.
         latents = jax.lax.map(lambda pair: encode_picture(self.encoder, *pair), (images, keys))
-        told = TextStates(self.states[view_index(azimuth, elevation)])
-        untold = TextStates(jnp.broadcast_to(self.states[-1], told.states.shape))
-        return score_distillation(self.prior, latents, told, untold, key, config, progress)
+        states, negatives = self.states[view_index(azimuth, elevation)], None
+        if config.perp_neg:
+            mixture = view_mixture(azimuth, elevation).astype(states.dtype)
+            states = jnp.einsum("vb,vtd->btd", mixture, self.states[: len(VIEWS)])
+            front, side = (TextStates(jnp.broadcast_to(s, states.shape)) for s in self.states[:2])
+            negatives = Negatives((front, side), unwanted_views(azimuth, elevation))
+        told = TextStates(states)
+        untold = TextStates(jnp.broadcast_to(self.states[-1], states.shape))
+        return score_distillation(
+            self.prior, latents, told, untold, key, config, progress, negatives
+        )
 
 
 def encode_picture(encoder: autoencoder.Encoder, image: Array, key: Array) -> Array:
@@ -110,7 +119,7 @@ def encode_picture(encoder: autoencoder.Encoder, image: Array, key: Array) -> Ar
 
 def view_index(azimuth: Array, elevation: Array) -> Array:
     """Which of `VIEWS` a camera sees: the front up to 45 degrees from +x, the back beyond 135."""
-    away = jnp.abs(jnp.arctan2(jnp.sin(azimuth), jnp.cos(azimuth)))
+    away = away_from_front(azimuth)
     around = jnp.where(away < jnp.pi / 4, 0, jnp.where(away > 3 * jnp.pi / 4, 2, 1))
     return jnp.where(elevation > OVERHEAD, 3, around)
 
