@@ -43,6 +43,10 @@ class Seen(Observed):
     def check_own(self, simulation, look):
         if look is None:
             raise self.fail("frames", "needs look=, what is drawn; `build` gives it")
+        for number, camera in enumerate(self.views):
+            numbers = (camera.rotation, camera.translation, camera.focal, camera.centre)
+            if not all(np.all(np.isfinite(part)) for part in numbers):
+                raise self.fail("cameras", f"number {number} has entries that are not finite")
         sizes = {(camera.height, camera.width) for camera in self.views}
         if len(sizes) != 1:
             raise self.fail("cameras", f"have several sizes, {sorted(sizes)}; give one observation "
