@@ -1,6 +1,6 @@
 """Runs benchmarks, and makes figures and tables of what they wrote.
 
-python -m benchmarks run SUITE --out FILE.jsonl [--quick] [--rounds N]
+python -m benchmarks run SUITE --out FILE.jsonl [--quick] [--rounds N] [--resume]
 python -m benchmarks report
 """
 
@@ -22,6 +22,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     run.add_argument("--out", type=Path, required=True)
     run.add_argument("--quick", action="store_true", help="small cases, under a minute a suite")
     run.add_argument("--rounds", type=int, help="processes for each case, instead of the suite's")
+    run.add_argument("--resume", action="store_true", help="skip cases that FILE has lines of")
     report = commands.add_parser("report", help="rebuild docs/benchmarks from committed lines")
     report.add_argument("--lines", type=Path, default=Path("benchmarks/lines"))
     report.add_argument("--out", type=Path, default=Path("docs/benchmarks"))
@@ -51,6 +52,12 @@ def describe(line: dict) -> str:
     )
 
 
+def _done(path: Path, suite: str) -> frozenset[str]:
+    """Names of a suite's cases that a file has lines of; a case's lines are written together."""
+    lines = map(json.loads, path.read_text().splitlines()) if path.exists() else ()
+    return frozenset(line["case"] for line in lines if line["suite"] == suite)
+
+
 def main() -> None:
     """Entry point."""
     options = parse()
@@ -66,7 +73,8 @@ def main() -> None:
     suites = worker.SUITES if options.suite == "all" else (options.suite,)
     with options.out.open("a") as out:
         for suite in suites:
-            for line in run_suite(suite, options.quick, options.rounds):
+            done = _done(options.out, suite) if options.resume else frozenset()
+            for line in run_suite(suite, options.quick, options.rounds, done):
                 out.write(json.dumps(line) + "\n")
                 out.flush()
                 print(describe(line), file=sys.stderr)

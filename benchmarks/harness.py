@@ -88,17 +88,23 @@ def _compared(line: dict, other: dict, name: str, pairs: list[float]) -> dict:
     return {**identity, **other, name: statistics.median(pairs), **spread}
 
 
-def run_suite(suite: str, quick: bool, times: int | None = None) -> Iterator[dict]:
+def run_suite(
+    suite: str, quick: bool, times: int | None = None, done: frozenset[str] = frozenset()
+) -> Iterator[dict]:
     """Lines of one suite: one per case and method, then one per peer and baseline. A suite of
     outcomes instead of times has `lines` of its own, from this process.
 
     times: processes for each case; None: as the suite says, one if it is to be quick.
+    done: names of cases that are not to be run again.
     """
     own = getattr(suite_module(suite), "lines", None)
     if own is not None:
         yield from own(quick)
         return
-    for _, group in groupby(suite_cases(suite, quick), key=lambda case: case.name):
+    yield from getattr(suite_module(suite), "left_out_lines", list)()
+    for name, group in groupby(suite_cases(suite, quick), key=lambda case: case.name):
+        if name in done:
+            continue
         cases = list(group)
         rounds: dict[str, list[dict]] = {case.method: [] for case in cases}
         usual = 1 if quick else max(case.rounds for case in cases)

@@ -171,8 +171,8 @@ def counted(name: str, modulus: float, method: str, least: int = 0) -> dict:
 
 def table(quick: bool):
     """All lines of counts."""
-    for name in SCENES:
-        for modulus in MODULI[::2] if quick else MODULI:
+    for modulus in MODULI[::2] if quick else MODULI:
+        for name in SCENES:
             yield counted(name, modulus, "explicit")
             for method in THETAS:
                 for least in SHARES[1:2] if quick else SHARES:

@@ -66,7 +66,7 @@ def _bounds(name: str):
         "walls": boundaries.Walls,
         "plane": partial(plane, friction=0.0),
         "rough": partial(plane, friction=0.4),
-        "ball": partial(boundaries.Ball, (0.5, 0.5, 0.3), 0.1),
+        "ball": partial(boundaries.Ball, (0.5, 0.5, 0.2), 0.1),
         "damping": partial(boundaries.Damping, 0.1),
     }[name]()
 

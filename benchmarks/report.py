@@ -2,9 +2,9 @@
 
     python -m benchmarks report
 
-reads work-precision.jsonl and tolerance.jsonl of benchmarks/lines, and writes README.md and
-tolerance.md of docs/benchmarks and the figures that they show. The same lines give the same
-bytes.
+reads work-precision.jsonl, tolerance.jsonl and leave-out.jsonl of benchmarks/lines, and writes
+README.md, tolerance.md and leave_out.md of docs/benchmarks and the figures that they show. The
+same lines give the same bytes.
 """
 
 import json
@@ -12,7 +12,9 @@ import math
 from collections import Counter, defaultdict
 from pathlib import Path
 
+from benchmarks.leave_out import cases as leave_out_cases
 from benchmarks.report_figures import draw_profile, draw_sheet
+from benchmarks.report_leave_out import leave_out_page
 from benchmarks.report_tolerance import tolerance_page
 
 SUITE = "work-precision"
@@ -21,11 +23,14 @@ FAILED = math.inf
 
 
 def read_lines(path: Path) -> list[dict]:
-    """The suite's lines of a file; of several for one case and method, the last."""
+    """The suite's lines of a file, but for those of peers that were not there; of several for one
+    case and method, the last.
+    """
     latest = {}
     for text in path.read_text().splitlines():
         line = json.loads(text)
-        if line.get("suite") == SUITE and "ratio" not in line and "cost" not in line:
+        told = "ratio" not in line and "cost" not in line and line.get("case") != "peers"
+        if line.get("suite") == SUITE and told:
             # A process that failed tells nothing but its case.
             line.setdefault("problem", line["case"].rsplit("-", 1)[0])
             line.setdefault("resolution", line.get("cells", 0))
@@ -182,7 +187,9 @@ line is how good the reference itself is, and points on the rail at the top have
 
 {orders}
 
-## What can be turned
+## What can be turned, and peers
+
+Taichi is this very step; Genesis and Newton are what they are ([peers](peers.md)).
 
 ![Error against run time of what can be turned](variants.svg)
 
@@ -192,7 +199,7 @@ line is how good the reference itself is, and points on the rail at the top have
 
 The share of grids on which a method needs at most so many times the time of the fastest one that is
 as accurate, to within a factor of 1.5 (Dolan and More 2002; failures count as never). Only methods
-that ran on every problem of the section above.
+that ran on every problem of the section above on which steps, transfers and kernels were varied.
 
 ![Performance profile](profile.svg)
 
@@ -230,7 +237,12 @@ def write_report(lines_folder: Path, out: Path) -> None:
         varied = {name: methods for name, methods in rollouts.items() if len(methods) > 1}
         if varied:
             draw_sheet(varied, out / "variants.svg", _name)
-            draw_profile(varied, out / "profile.svg", _name)
+            # Where only peers stand beside the default, nothing was varied.
+            own = {
+                name: methods for name, methods in varied.items()
+                if any(m.startswith("jaxphys") and m != BASE for m in methods)
+            }  # fmt: skip
+            draw_profile(own, out / "profile.svg", _name)
         sections = [f"### {name}\n\n{variants_table(m)}" for name, m in varied.items()]
         page = PAGE.format(
             machines=machines(lines),
@@ -244,3 +256,7 @@ def write_report(lines_folder: Path, out: Path) -> None:
     path = lines_folder / "tolerance.jsonl"
     if path.exists():
         (out / "tolerance.md").write_text(tolerance_page(path))
+    path = lines_folder / "leave-out.jsonl"
+    if path.exists():
+        parts = list(dict.fromkeys(case.name for case in leave_out_cases(quick=False)))
+        (out / "leave_out.md").write_text(leave_out_page(path, parts))

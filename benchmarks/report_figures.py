@@ -9,10 +9,24 @@ COLOURS = (
     "#7f7f7f", "#17becf", "#bcbd22", "#9467bd", "#2f4f4f", "#ff9896",
 )  # fmt: skip
 MARKS = "osD^v<>PX*hd8p"
+OURS = "jaxphys"
 COLUMNS = 3
 AS_ACCURATE = 1.5
 
 Methods = dict[str, list[dict]]
+
+
+def _ours_first(method: str) -> tuple[bool, str]:
+    return not method.startswith(OURS), method
+
+
+def _look(index: int, method: str) -> dict[str, str]:
+    """Of a curve: peers are dotted, in the same colours."""
+    return {
+        "color": COLOURS[index % len(COLOURS)],
+        "marker": MARKS[index % len(MARKS)],
+        "linestyle": "-" if method.startswith(OURS) else ":",
+    }
 
 
 def _pyplot():
@@ -58,8 +72,9 @@ def draw_sheet(problems: dict[str, Methods], path: Path, name: Callable[[str], s
     floor of the reference.
     """
     pyplot = _pyplot()
-    methods = sorted({method for curves in problems.values() for method in curves})
-    look = {m: (COLOURS[i % len(COLOURS)], MARKS[i % len(MARKS)]) for i, m in enumerate(methods)}
+    methods = sorted({method for curves in problems.values() for method in curves}, key=_ours_first)
+    ours = sum(m.startswith(OURS) for m in methods)
+    look = {m: _look(i if i < ours else i - ours, m) for i, m in enumerate(methods)}
     rows = math.ceil(len(problems) / COLUMNS)
     height = 2.1 if len(methods) == 1 else 3.4
     figure, grid = pyplot.subplots(
@@ -76,10 +91,7 @@ def draw_sheet(problems: dict[str, Methods], path: Path, name: Callable[[str], s
     for axes in grid[:, 0]:
         axes.set_ylabel("error, relative", fontsize=8)
     if len(methods) > 1:
-        handles = [
-            pyplot.Line2D([], [], color=look[m][0], marker=look[m][1], markersize=4, label=name(m))
-            for m in methods
-        ]
+        handles = [pyplot.Line2D([], [], markersize=4, label=name(m), **look[m]) for m in methods]
         figure.legend(
             handles=handles, loc="outside lower center", ncols=6, fontsize=7, frameon=False
         )
@@ -95,7 +107,6 @@ def _draw_problem(axes, curves: Methods, look: dict) -> None:
     finite = [_error(x) for ladder in timed.values() for x in ladder if _error(x) < math.inf]
     rail = 3 * max(finite, default=1.0)
     for method, ladder in timed.items():
-        colour, mark = look[method]
         good = [line for line in ladder if _error(line) < math.inf]
         failed = [line for line in ladder if _error(line) == math.inf]
         seconds = [line["seconds"] for line in good]
@@ -105,11 +116,11 @@ def _draw_problem(axes, curves: Methods, look: dict) -> None:
             spread[0].append(max(0.0, line["seconds"] - min(samples)))
             spread[1].append(max(0.0, max(samples) - line["seconds"]))
         axes.errorbar(
-            seconds, [_error(line) for line in good], xerr=spread, color=colour, marker=mark,
-            markersize=3.5, linewidth=1.1, elinewidth=0.6,
+            seconds, [_error(line) for line in good], xerr=spread, markersize=3.5, linewidth=1.1,
+            elinewidth=0.6, **look[method],
         )  # fmt: skip
-        axes.plot([line["seconds"] for line in failed], [rail] * len(failed), linestyle="none",
-                  marker=mark, markersize=5, markerfacecolor="white", color=colour)  # fmt: skip
+        axes.plot([line["seconds"] for line in failed], [rail] * len(failed), markersize=5,
+                  **(look[method] | {"linestyle": "none", "markerfacecolor": "white"}))  # fmt: skip
     floors = [line.get("floor", 0.0) for ladder in timed.values() for line in ladder]
     if max(floors, default=0.0) > 0:
         axes.axhline(max(floors), color="#888888", linestyle="--", linewidth=0.8)

@@ -2,7 +2,8 @@
 
 Every problem of the catalogue on its ladder of grids, in float64 and otherwise as it is by default;
 on three of them (a bar, a vortex, a ringing cube) also in float32, with other steps, transfers,
-kernels and particles a cell, and on the cube the peer. Beside them pictures against a dense picture
+kernels and particles a cell, and on the cube the peer; two more peers where they can state the
+problem and are installed (`work_precision_peers`). Beside them pictures against a dense picture
 in float64, and gradients against those of `Plain` in float64. A line's `error` is the problem's own
 norm.
 
@@ -14,6 +15,8 @@ from functools import partial
 
 from benchmarks.case import Case, Prepared
 from benchmarks.work_precision_more import gradient_cases, picture_cases
+from benchmarks.work_precision_peers import left_out
+from benchmarks.work_precision_peers import methods as peer_methods
 
 # Grids of each problem, coarsest first; those that are quick come with --quick.
 LADDERS = {
@@ -218,33 +221,42 @@ def prepare_peer(name: str, resolution: int) -> Prepared:
     )
 
 
+def left_out_lines() -> list[dict]:
+    """A line for every peer that cannot be run here, saying why."""
+    suite = {"suite": "work-precision", "case": "peers"}
+    return [{**suite, "method": name, "status": why} for name, why in left_out()]
+
+
 def cases(quick: bool) -> list[Case]:
     """The whole sweep: one case for every grid of every problem, its methods in turn."""
-    varied = QUICK_VARIED if quick else VARIED
+    varied, ladders = (QUICK_VARIED, QUICK) if quick else (VARIED, LADDERS)
     found = []
-    for name, ladder in (QUICK if quick else LADDERS).items():
-        for resolution in ladder:
-            methods = {"jaxphys-float64": partial(prepare, name, resolution, {})}
-            if resolution in varied.get(name, ()):
-                methods["jaxphys"] = partial(prepare, name, resolution, {"dtype": "float32"})
-                for variant in QUICK_VARIANTS if quick else VARIANTS:
-                    if variant in WITHOUT.get(name, ()):
-                        continue
+    # Coarse grids of all problems first, so that a sweep that is cut short has seen them all.
+    for name, resolution in sorted(
+        ((name, resolution) for name, ladder in ladders.items() for resolution in ladder),
+        key=lambda one: ladders[one[0]].index(one[1]),
+    ):
+        methods = {"jaxphys-float64": partial(prepare, name, resolution, {})}
+        if resolution in varied.get(name, ()):
+            methods["jaxphys"] = partial(prepare, name, resolution, {"dtype": "float32"})
+            for variant in QUICK_VARIANTS if quick else VARIANTS:
+                if variant not in WITHOUT.get(name, ()):
                     methods[f"jaxphys-{variant}"] = partial(
                         prepare, name, resolution, VARIANTS[variant]
                     )
-                if name in PEER_CASES:
-                    methods["taichi"] = partial(prepare_peer, name, resolution)
-            for method, run in methods.items():
-                single = method in ("jaxphys", "taichi")
-                found.append(
-                    Case(
-                        f"{name}-{resolution}",
-                        method,
-                        run,
-                        {"cells": resolution},
-                        dtype="float32" if single else "float64",
-                        rounds=1,
-                    )
+            if name in PEER_CASES:
+                methods["taichi"] = partial(prepare_peer, name, resolution)
+        peers = peer_methods(name, resolution, quick)
+        for method, run in (methods | peers).items():
+            single = method in ("jaxphys", "taichi", *peers)
+            found.append(
+                Case(
+                    f"{name}-{resolution}",
+                    method,
+                    run,
+                    {"cells": resolution},
+                    dtype="float32" if single else "float64",
+                    rounds=1,
                 )
+            )
     return [*found, *picture_cases(quick), *gradient_cases(quick)]

@@ -33,7 +33,7 @@ OBJECTS = {
     "plasticine": ("teddy bear", 0),
     "snow": ("snowman", 0),
     "wet-sand": ("castle", 0),
-    "memory-foam": ("pillow", 0),
+    "memory-foam": ("cube", 0),
     "muscle": ("heart", 3),
 }
 
@@ -67,16 +67,21 @@ def main() -> None:
     parser.add_argument("material", choices=[*OBJECTS, "all"])
     parser.add_argument("--out", type=Path, default=Path("outputs/showcase"))
     parser.add_argument("--sheets", type=Path)
-    parser.add_argument("--frames", type=int, default=48)
+    parser.add_argument("--frames", type=int, help="over the scene's own time")
     parser.add_argument("--width", type=int, default=960)
     parser.add_argument("--height", type=int, default=540)
     parser.add_argument("--splats", type=int, default=20_000)
+    parser.add_argument("--spacing", type=float, help="of the grid [m]")
     parser.add_argument("--seed", type=int, help="another one of the object's kind")
     options = parser.parse_args()
     for material in OBJECTS if options.material == "all" else (options.material,):
+        spacing = {} if options.spacing is None else {"spacing": options.spacing}
+        scene = default_scene(material, **spacing)
+        frames = options.frames or scene.frames
         scene = dataclasses.replace(
-            default_scene(material),
-            frames=options.frames,
+            scene,
+            frames=frames,
+            fps=scene.fps * frames / scene.frames,
             width=options.width,
             height=options.height,
         )

@@ -1,7 +1,7 @@
 """Suite 'extreme': scenes and pictures at the edge of what is sound, each with its answer.
 
 python -m benchmarks run extreme --out FILE.jsonl [--quick]
-python -m benchmarks.extreme.table FILE.jsonl > docs/benchmarks/extreme.md
+python -m benchmarks.extreme.table FILE.jsonl [PEERS.jsonl] > docs/benchmarks/extreme.md
 """
 
 from collections.abc import Iterator

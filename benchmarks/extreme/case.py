@@ -8,7 +8,7 @@ is part of the case; controls must come to `wrong`.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -52,6 +52,7 @@ class Case:
         expects: outcomes that are right for it, most often one.
         by: what it is held against.
         quick: whether it is one of the fast subset.
+        build: dtype -> the scene that is run, where it is one of matter.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Case:
     by: str
     expects: frozenset[str] = field(default=frozenset({RIGHT}))
     quick: bool = False
+    build: Callable[[str], Any] | None = None
 
 
 def judged(measures: tuple[Measure, ...], **more) -> Cell:

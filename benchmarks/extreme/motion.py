@@ -30,6 +30,7 @@ ALONE, SIMILAR, KEPT = "closed form", "similarity", "conservation"
 def _case(name, group, build, measures, by, methods=ADAPTIVE, **more) -> Case:
     if "expects" in more:
         more["expects"] = frozenset(more["expects"])
+    more["build"] = build
     return Case(name, group, partial(run, build, measures), tuple(methods), by, **more)
 
 

@@ -27,6 +27,7 @@ PACKAGES = {
     "jaxphys.fitting": "Fitting",
     "jaxphys.export": "Formats of other programs",
     "jaxphys.problems": "Problems with known answers",
+    "jaxphys.reconstruction": "Photographs to Gaussians",
     "jaxphys.accuracy": "How right a motion is",
     "jaxphys.pipeline": "Whole runs",
     "jaxphys.evaluate": "Scores",

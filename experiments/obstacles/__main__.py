@@ -1,10 +1,11 @@
-"""Things that are pushed, gripped and struck, without any trained prior.
+"""Things that are pushed, gripped, struck, twisted and poured, without any trained prior.
 
     python -m experiments.obstacles pusher --out outputs/obstacles
     python -m experiments.obstacles all
 
 The scenes are the JSON files beside this one; `jaxphys animate OBJECT --config FILE` runs them with
-another object. Takes some minutes a scene on two cores.
+another object. `twist` and `grains` are after Newton's examples `mpm_beam_twist` and
+`mpm_granular`. Takes some minutes a scene on two cores.
 """
 
 import argparse
@@ -14,7 +15,13 @@ from experiments.showcase import model_gaussians, small_sheet
 from jaxphys import animate
 from jaxphys.scene import read_scene
 
-OBJECTS = {"pusher": "burger", "gripper": "apple", "cannonball": "strawberry"}
+OBJECTS = {
+    "pusher": "burger",
+    "gripper": "apple",
+    "cannonball": "strawberry",
+    "twist": "baguette",
+    "grains": "cube",
+}
 
 
 def main() -> None:

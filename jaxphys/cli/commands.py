@@ -178,6 +178,8 @@ def animate(
     substep: float | None = None,
     unsafe_dt: bool = False,
     tolerance: float | None = None,
+    up: Literal["auto", "x", "-x", "y", "-y", "z", "-z"] | None = None,
+    crop: bool = False,
     save_splats: bool = False,
     settings: Settings = (),
     quiet: bool = False,
@@ -205,6 +207,9 @@ def animate(
         unsafe_dt: Take --substep even if it is beyond what is stable.
         tolerance: Relative error of the motion that is allowed, such as 0.03: pilots on coarse
             grids say which grid that needs, or why nothing can be said.
+        up: The axis of the file that points upwards, or auto: as the photographs of a trained
+            model say. Default: z.
+        crop: Leave out what of a capture is not its object: background and floaters.
         save_splats: Also write one .ply for each picture.
         settings: Any field of the scene by its path in the file, or a parameter or field of the
             first object for short, once or more: youngs_modulus=2e4, boundaries.0.friction=0.2.
@@ -213,7 +218,7 @@ def animate(
         overwrite: Replace the files of an earlier run of another request, and only these.
     """
     from jaxphys.cli.made import tell
-    from jaxphys.cli.scenes import files_read, scene_for, stepping_for, with_source
+    from jaxphys.cli.scenes import as_captured, files_read, scene_for, stepping_for, with_source
     from jaxphys.cli.settings import with_settings
     from jaxphys.pipeline.animate import animate as run
 
@@ -222,7 +227,7 @@ def animate(
     scene = scene_for(config, material, changes, source)
     if unsafe_dt:
         scene = scene_for(None, None, {"unsafe_substep": True}, base=scene)
-    scene = with_settings(scene, settings)
+    scene = with_settings(as_captured(scene, source, up, crop, config is None), settings)
     scene, beside = with_source(scene, source, config, splats)
     made = run(
         scene,

@@ -14,6 +14,7 @@ def export(
     to: Literal["ply", "compressed-ply", "gltf", "spz", "usd"],
     out: Path | None = None,
     frames: str | None = None,
+    as_file: bool = False,
     overwrite: bool = False,
 ) -> int:
     """Write the frames of a run, or a file of splats, for other programs.
@@ -28,9 +29,11 @@ def export(
         out: File, or for the frames of a run a directory: new, empty or of an earlier export.
             Default: beside the source, named after it.
         frames: Of a run, a:b from frame a to before frame b, or one number. Default: all.
+        as_file: In the coordinates and units of the object's own file, as its capture has it, in
+            place of metres with z up.
         overwrite: Replace what is there.
     """
     from jaxphys.pipeline.export import export as run
 
-    print(run(source, to, out, frames=frames, overwrite=overwrite, progress=True))
+    print(run(source, to, out, frames=frames, as_file=as_file, overwrite=overwrite, progress=True))
     return 0

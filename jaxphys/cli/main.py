@@ -21,6 +21,7 @@ from jaxphys.cli.export import export
 from jaxphys.cli.fit import fit
 from jaxphys.cli.page import page
 from jaxphys.cli.priors import priors
+from jaxphys.cli.reconstruct import reconstruct
 from jaxphys.cli.study import study
 from jaxphys.core.errors import InputError, one_line
 
@@ -30,6 +31,7 @@ COMMANDS: dict[str, Callable[..., int]] = {
     "generate": commands.generate,
     "image": commands.image,
     "animate": commands.animate,
+    "reconstruct": reconstruct,
     "splat": commands.splat,
     "render": commands.render,
     "export": export,

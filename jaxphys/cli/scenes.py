@@ -1,9 +1,12 @@
 """From command line arguments to a scene."""
 
 import dataclasses
+import math
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
+
+import numpy as np
 
 from jaxphys.core.errors import InputError, one_line
 from jaxphys.core.reading import reading
@@ -11,9 +14,17 @@ from jaxphys.mpm.materials.catalogue import get_material
 from jaxphys.mpm.stepping import Adaptive, Fixed, Implicit
 from jaxphys.scene.build import validate
 from jaxphys.scene.defaults import default_scene
-from jaxphys.scene.model_folder import is_trained, splats_in
+from jaxphys.scene.model_folder import (
+    CAMERAS,
+    GENERATED,
+    cameras_beside,
+    is_trained,
+    splats_in,
+)
 from jaxphys.scene.read import read_scene
-from jaxphys.scene.scene import Scene
+from jaxphys.scene.scene import Rotation, Scene, Up
+
+LEANING = 0.85  # of what photographs call up the part along z, below which a line is said
 
 
 def scene_for(
@@ -33,8 +44,8 @@ def scene_for(
     """
     if config is None and material is None and source is not None and source.is_dir():
         config = source / "config.json"
-        if is_trained(source) and not config.exists():
-            config = None
+        if not config.exists() and (is_trained(source) or (source / GENERATED).exists()):
+            config = None  # of photographs, with no scene yet
     if base is not None:
         scene = base
     elif config is not None:
@@ -62,6 +73,56 @@ def stepping_for(name: str | None, substep: float | None = None) -> dict[str, An
     if name is None:
         return {} if substep is None else {"stepping": Fixed()}
     return {"stepping": {"adaptive": Adaptive, "fixed": Fixed, "implicit": Implicit}[name]()}
+
+
+def as_captured(scene: Scene, source: Path | None, up: str | None, crop: bool, told: bool) -> Scene:
+    """The scene with its first object upright and cropped as `--up` and `--crop` say.
+
+    A trained model's cameras say what is up: for "auto" they turn it, and without `--up` a line on
+    standard error tells where they disagree with the scene, if it is `told`.
+
+    Raises:
+        InputError: "auto", and there are no cameras.
+    """
+    first = scene.objects[0]
+    if crop:
+        first = dataclasses.replace(first, crop=True)
+    seen = _up_in_photographs(source) if source is not None else None
+    if up == "auto":
+        if seen is None:
+            raise InputError(
+                f"--up auto: there is no {CAMERAS} beside the splats; name the axis, such as -y"
+            )
+        first = dataclasses.replace(first, up="z", rotation=(*_turn_to_z(seen), *first.rotation))
+    elif up is not None:
+        first = dataclasses.replace(first, up=cast(Up, up))
+    elif told and seen is not None and seen[2] < LEANING and first.up == "z":
+        axis = np.argmax(np.abs(seen))
+        named = ("-" if seen[axis] < 0 else "") + "xyz"[axis]
+        line = f"note: the photographs say that {named} is up: --up auto stands the object upright"
+        print(line, file=sys.stderr)
+    return dataclasses.replace(scene, objects=(first, *scene.objects[1:]))
+
+
+def _up_in_photographs(source: Path) -> np.ndarray | None:
+    """What is up on the mean in a trained model's photographs, (3,) of length 1, if anything is."""
+    cameras = cameras_beside(source)
+    if not cameras:
+        return None
+    up = np.mean([-np.asarray(camera.rotation)[:, 1] for camera in cameras], axis=0)
+    length = np.linalg.norm(up)
+    return up / length if length > 0.1 else None
+
+
+def _turn_to_z(up: np.ndarray) -> tuple[Rotation, ...]:
+    axis = np.cross(up, (0.0, 0.0, 1.0))
+    angle = math.degrees(math.atan2(np.linalg.norm(axis), up[2]))
+    if np.linalg.norm(axis) < 1e-6:
+        if up[2] > 0:
+            return ()
+        axis = np.array([1.0, 0.0, 0.0])
+    x, y, z = (float(a) for a in axis / np.linalg.norm(axis))
+    return (Rotation((x, y, z), angle),)
 
 
 def files_read(config: Path | None, source: Path | None = None) -> tuple[Path, ...]:

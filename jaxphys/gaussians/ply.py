@@ -302,3 +302,30 @@ def _gaussians(path: Path, table: dict[str, np.ndarray], dtype, drop_invalid: bo
         np.concatenate([dc, rest], axis=1),
     ]
     return Gaussians(*(jnp.asarray(part) for part in parts))
+
+
+def read_points(path: str | os.PathLike, *, limit: int = 20_000_000) -> tuple[np.ndarray, ...]:
+    """Points (N, 3) and colours in [0, 1] (N, 3), both float32, from a .ply of a point cloud.
+
+    Colours are the fields red, green, blue, bytes or numbers in [0, 1]; grey where there are none.
+
+    Args:
+        path: the file.
+        limit: the most points accepted.
+
+    Raises:
+        InputError: the file is missing, cut off, no .ply, or has no finite places.
+    """
+    with reading(path) as path:
+        with open(path, "rb") as file:
+            style, elements = read_header(file, path)
+            table = _read_table(file, path, style, elements, limit)
+        if missing := [name for name in _POSITION if name not in table]:
+            raise InputError(f"{path}: no field '{missing[0]}'; give a .ply of points")
+        points = np.stack([np.asarray(table[name], np.float64) for name in _POSITION], axis=1)
+        _require_finite_fields(path, _POSITION, points)
+        if any(name not in table for name in ("red", "green", "blue")):
+            return points.astype(np.float32), np.full(points.shape, 0.5, np.float32)
+        colours = np.stack([table[name] for name in ("red", "green", "blue")], axis=1)
+        largest = 255.0 if colours.size and colours.max() > 1 else 1.0
+        return points.astype(np.float32), np.clip(colours / largest, 0, 1).astype(np.float32)

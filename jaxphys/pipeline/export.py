@@ -8,7 +8,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -32,7 +32,7 @@ from jaxphys.pipeline.animate import source_files, splats_name
 from jaxphys.pipeline.draw import deformed_gaussians
 from jaxphys.pipeline.frames import frames as simulated
 from jaxphys.pipeline.resume import FOLDER
-from jaxphys.scene.build import build
+from jaxphys.scene.build import build, place_objects
 from jaxphys.scene.obstacles import located, mesh_file, mesh_obstacles
 from jaxphys.scene.read import read_scene
 from jaxphys.scene.scene import Scene
@@ -73,6 +73,7 @@ def export(
     out: str | os.PathLike | None = None,
     *,
     frames: str | None = None,
+    as_file: bool = False,
     overwrite: bool = False,
     progress: bool = False,
 ) -> Path:
@@ -86,6 +87,8 @@ def export(
         out: a file where the format or the source has one only, else a folder, which is new,
             empty or of an earlier export; None: beside the source, named after it.
         frames: of a run: "a:b" from frame a to before frame b, either left out; "a" a single one.
+        as_file: of a run: in the coordinates and units of the first object's own file, in which it
+            then lies where it lay in its capture; else in the domain's, metres with z up.
         overwrite: whether what is there may be replaced.
         progress: whether to show a bar with the time left on standard error.
 
@@ -98,6 +101,8 @@ def export(
         raise InputError(f"--to {shown(to)}: is no format; {nearest(to, FORMATS)}")
     path = Path(source)
     found = _run(path, frames) if path.is_dir() else _file(path, frames)
+    if as_file:
+        found = _as_file(path, found)
     form = FORMATS[to]
     if found.single or form.begin is None:
         target = _file_target(found, to, out)
@@ -116,7 +121,7 @@ def export(
         )
     identity = fingerprint(
         b"export",
-        f"{to} {found.numbers}".encode(),
+        f"{to} {found.numbers} {as_file}".encode(),
         *(one.read_bytes() for one in found.decides),
     )
     names = {number: numbered_name(number, form.suffix) for number in found.numbers}
@@ -133,6 +138,26 @@ def export(
             folder.remove(*names.values())
             raise
         return folder.path
+
+
+def _as_file(folder: Path, found: _Source) -> _Source:
+    """The same in the coordinates of the first object's file."""
+    if not folder.is_dir():
+        raise InputError(f"--as-file: {folder} is in its own coordinates already; leave it out")
+    scene = located(read_scene(folder / CONFIG).scene.filmed(), folder)
+    objects = tuple(
+        load_object(thing, folder, scene.seed + i, f"objects[{i}]")
+        for i, thing in enumerate(scene.objects)
+    )
+    placement = place_objects(scene, objects)[0].placement
+    return replace(
+        found,
+        inputs=(*found.inputs, *source_files(scene, folder)),
+        frames=lambda: (
+            NumberedGaussians(frame.number, placement.undone(frame.gaussians))
+            for frame in found.frames()
+        ),
+    )
 
 
 def _beside(source: Path, ending: str) -> Path:

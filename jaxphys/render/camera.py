@@ -84,6 +84,7 @@ def look_at(
     if not 0.0 < field_of_view < math.pi:
         raise InputError(f"field_of_view = {field_of_view} rad: must lie between 0 and pi")
     dtype = dtype or (eye.dtype if hasattr(eye, "dtype") else jnp.float32)
+    dtype = jax.dtypes.canonicalize_dtype(dtype)  # float64 of numpy where JAX has float32 alone
     eye, target, up = (jnp.asarray(v, dtype) for v in (eye, target, up))
 
     forward = _unit(target - eye, jnp.array([0.0, 1.0, 0.0], dtype))

@@ -76,7 +76,7 @@ def validate(scene: Scene) -> None:
     for i, thing in enumerate(scene.objects):
         where = f"objects[{i}]"
         try:
-            material = get_material(thing.material)
+            get_material(thing.material)
         except InputError as error:
             raise InputError(f"{where}.material: {error}") from None
         try:
@@ -84,7 +84,7 @@ def validate(scene: Scene) -> None:
         except InputError as error:
             raise InputError(f"{where}.law: {error}") from None
         try:
-            material_of(thing)
+            material = material_of(thing)
         except InputError as error:
             raise InputError(f"{where}.{error}") from None
         for label, parameters in [

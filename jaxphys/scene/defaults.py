@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Literal
 
-from jaxphys.mpm.boundaries import Plane, Vector, Walls
+from jaxphys.mpm.boundaries import Capsule, Keyframes, Plane, Vector, Walls
 from jaxphys.mpm.materials.catalogue import get_material
 from jaxphys.scene.scene import Domain, Filling, Ground, Object, Region, Rotation, Scene
 
@@ -23,6 +23,8 @@ MIDDLE = SIDE / 2
 # cells outside it.
 FLOOR = 0.25
 INSET = 0.2
+# Turns a capsule so that it lies along the view of the usual camera (`View.azimuth`), -60 degrees.
+INTO_PICTURE = (0.70711, 0.61237, 0.35355, 0.0)
 TANK = 0.6  # from the domain's sides to those of the glass tank that water is poured into
 
 
@@ -184,11 +186,28 @@ def _wet_sand(domain: Domain) -> Scene:
 
 
 def _memory_foam(domain: Domain) -> Scene:
-    return _dropped("memory-foam", domain, gap=0.2, speed=2.0, follow="total")
+    size, radius, deep = 0.75, 0.16, 0.4
+    scene = _dropped("memory-foam", domain, size=size, gap=0.01, speed=0.0, follow="total")
+    above = FLOOR + size + radius + 0.05
+    bar = Capsule(
+        centre=(MIDDLE, MIDDLE, above),
+        orientation=INTO_PICTURE,
+        radius=radius,
+        half_height=0.5,
+        friction=0.3,
+        motion=Keyframes(
+            times=(0.1, 0.6, 1.0, 1.3),
+            displacements=tuple((0.0, 0.0, z) for z in (0.0, -deep, -deep, 0.5)),
+            interpolation="smooth",
+        ),
+    )
+    # It is the return that tells it from other foam, and that takes its time.
+    return replace(scene, boundaries=(*scene.boundaries, bar), frames=96)
 
 
 def _muscle(domain: Domain) -> Scene:
-    return _dropped("muscle", domain, gap=0.1, speed=1.0, friction=0.2, follow="total", damping=2.5)
+    # It stands there and works; at rest nothing would tell it from a jelly.
+    return _dropped("muscle", domain, gap=0.01, speed=0.0, follow="total", damping=2.5)
 
 
 _SCENES: dict[str, Callable[[Domain], Scene]] = {

@@ -9,12 +9,14 @@ from scipy.spatial import cKDTree
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.rotations import axis_angle_to_matrix
+from jaxphys.gaussians.cropping import object_of
 from jaxphys.gaussians.filling import Filled, FillingConfig, fill
 from jaxphys.gaussians.gaussians import (
     Gaussians,
     concatenate,
     from_points,
     opacities,
+    scales,
     select,
     transform,
 )
@@ -48,7 +50,7 @@ class Placed(NamedTuple):
         still: Gaussians outside the object's `area`, drawn where they are.
         filling: further particles inside, (M, 3) [m].
         volumes: of the particles [m^3], (K + M,), those of Gaussians first.
-        lone: number of splats beside the object that were left out.
+        lone: number of splats beside the object that were left out, cropped ones among them.
         placement: where the contents of the object's file are in the domain.
     """
 
@@ -61,8 +63,8 @@ class Placed(NamedTuple):
 
 
 def rotation_matrix(thing: Object, where: str) -> np.ndarray:
-    """All turns of an object as one matrix (3, 3)."""
-    total = np.eye(3)
+    """All turns of an object as one matrix (3, 3), that which makes it upright first."""
+    total = _upright(thing.up)
     for i, turn in enumerate(thing.rotation):
         axis = np.asarray(turn.axis, np.float64)
         if not np.any(axis):
@@ -70,6 +72,14 @@ def rotation_matrix(thing: Object, where: str) -> np.ndarray:
         matrix = axis_angle_to_matrix(jnp.asarray(axis), jnp.asarray(math.radians(turn.degrees)))
         total = np.asarray(matrix, np.float64) @ total
     return total
+
+
+def _upright(up: str) -> np.ndarray:
+    """The rotation that brings an axis of the source to z, another one staying horizontal."""
+    axis, sign = "xyz".index(up[-1]), -1.0 if up[0] == "-" else 1.0
+    z = sign * np.eye(3)[axis]
+    x = np.eye(3)[0 if axis else 1]
+    return np.stack([x, np.cross(z, x), z])
 
 
 def place(
@@ -100,6 +110,10 @@ def place(
     rotation = rotation_matrix(thing, where)
     gaussians = transform(select(gaussians, np.flatnonzero(visible)), rotation)
     means = np.asarray(gaussians.means, np.float64)
+    cropped = 0
+    if thing.crop:
+        own = object_of(means, np.asarray(scales(gaussians), np.float64).max(axis=1))
+        gaussians, means, cropped = select(gaussians, np.flatnonzero(own)), means[own], sum(~own)
     chosen = np.ones(len(means), bool)
     if thing.area is not None:
         low, high = np.array(thing.area[0::2]), np.array(thing.area[1::2])
@@ -123,7 +137,8 @@ def place(
     moving, still = (transform(part, translation=centre) for part in (moving, still))
     filling = (filling + centre).astype(moving.means.dtype)
     placement = Placement.of(rotation, scale, middle, centre)
-    return Placed(moving, still, filling, volumes, int(np.sum(chosen & ~kept)), placement)
+    left_out = int(cropped + np.sum(chosen & ~kept))
+    return Placed(moving, still, filling, volumes, left_out, placement)
 
 
 def _frame(means: np.ndarray, size: float) -> tuple[np.ndarray, float]:

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxphys.gaussians.gaussians import Gaussians, transform
 from jaxphys.mpm.boundaries import Vector
 
 Matrix = tuple[Vector, Vector, Vector]
@@ -41,6 +42,16 @@ class Placement(NamedTuple):
         """Places (..., 3) in the file, in the domain [m]."""
         turned = np.asarray(x, np.float64) @ np.asarray(self.rotation).T
         return self.scale * (turned - self.middle) + self.centre
+
+    def undone(self, gaussians: Gaussians) -> Gaussians:
+        """Gaussians of the domain in the coordinates and units of the file."""
+        rotation = np.asarray(self.rotation)
+        turned = transform(
+            gaussians,
+            scale=1 / self.scale,
+            translation=self.middle - np.asarray(self.centre) / self.scale,
+        )
+        return transform(turned, rotation.T)
 
 
 AS_IT_IS = Placement.of(np.eye(3), 1.0, np.zeros(3), np.zeros(3))

@@ -25,6 +25,7 @@ from jaxphys.mpm.transfer.schemes import Transfer
 from jaxphys.scene.view import ANGLE, View
 
 Area = tuple[float, float, float, float, float, float]
+Up = Literal["x", "-x", "y", "-y", "z", "-z"]
 
 MOST_SPLATS = 20_000_000
 MOST_NODES = 512**3
@@ -108,7 +109,10 @@ class Object(Checked):
         regions: boxes with other parameters; later ones win.
         size: longest side after rotation [m].
         centre: of the bounding box, in the domain [m].
-        rotation: turns in the order given, about the object's centre.
+        up: the axis of the source that points upwards.
+        rotation: turns in the order given, about the object's centre, once it is upright.
+        crop: leave out what is not the object: background, floaters and oversized splats of a
+            capture, by a rule (`jaxphys.gaussians.cropping`).
         velocity: at the start [m/s].
         spin: at the start, about the centre [rad/s].
         opacity_threshold: Gaussians below it take no part and are not drawn.
@@ -126,7 +130,9 @@ class Object(Checked):
     regions: tuple[Region, ...] = ()
     size: float = field(default=1.0, metadata=LENGTH)
     centre: Vector = field(default=(1.25, 1.25, 1.0), metadata=PLACE)
+    up: Up = "z"
     rotation: tuple[Rotation, ...] = ()
+    crop: bool = False
     velocity: Vector = field(default=(0.0, 0.0, 0.0), metadata=SPEED)
     spin: Vector = field(default=(0.0, 0.0, 0.0), metadata=RATE)
     opacity_threshold: float = field(default=0.02, metadata=between(0, 1))

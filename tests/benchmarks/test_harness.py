@@ -80,7 +80,9 @@ def test_a_whole_run_is_called_once(monkeypatch):
 
 
 # The suite of outcomes has lines of its own (tests/benchmarks/test_extreme.py).
-@pytest.mark.parametrize("suite", [suite for suite in worker.SUITES if suite != "extreme"])
+@pytest.mark.parametrize(
+    "suite", [suite for suite in worker.SUITES if not suite.startswith("extreme")]
+)
 @pytest.mark.parametrize("quick", [True, False])
 def test_every_suite_lists_cases_of_its_own_names(suite, quick):
     cases = worker.suite_cases(suite, quick)
@@ -120,3 +122,37 @@ def test_peers_run_in_the_cases_that_they_can():
     assert peers("mpm") == {f"{law}-{size}" for law in laws for size in ("64k", "262k")}
     # Every step of 50k-2000 would take 47 GB.
     assert peers("mpm-grad") == {"50k-100"}
+
+
+def test_a_sweep_goes_on_where_it_was_stopped(monkeypatch, tmp_path):
+    """Cases that the file has lines of are not run again; --resume alone says so."""
+    from benchmarks import __main__ as program
+    from benchmarks import harness
+
+    cases = [Case(name, "jaxphys", lambda: None, {"n": 1}, rounds=1) for name in ("a", "b", "c")]
+    monkeypatch.setattr(harness, "suite_cases", lambda suite, quick: cases)
+    ran = []
+
+    def process(suite, name, method, quick):
+        ran.append(name)
+        return round_of(1.0) | {"case": name}
+
+    monkeypatch.setattr(harness, "run_process", process)
+    out = tmp_path / "lines.jsonl"
+    other = {"suite": "headline", "case": "c"}
+    out.write_text(json.dumps({"suite": "mpm", "case": "a"}) + "\n" + json.dumps(other) + "\n")
+    command = ["benchmarks", "run", "mpm", "--out", str(out)]
+    monkeypatch.setattr("sys.argv", [*command, "--resume"])
+    program.main()
+    assert ran == ["b", "c"]
+    monkeypatch.setattr("sys.argv", command)
+    program.main()
+    assert ran == ["b", "c", "a", "b", "c"]
+
+
+def test_coarse_grids_of_all_problems_come_first():
+    from benchmarks.work_precision import LADDERS, cases
+
+    names = list(dict.fromkeys(case.name for case in cases(quick=False)))
+    coarse = [f"{name}-{ladder[0]}" for name, ladder in LADDERS.items()]
+    assert names[: len(coarse)] == coarse

@@ -41,6 +41,9 @@ LINES = [
     {"suite": "work-precision", "case": "vortex-8", "method": "jaxphys-float64", "cells": 8,
      "status": "exit 1: out of memory"},
     {"suite": "work-precision", "case": "bar-8", "method": "jaxphys", "peer": "x", "ratio": 2.0},
+    line("particle", "jaxphys-float64", 50, 0.01, 0.1),
+    line("particle", "genesis", 50, 0.01, 0.2),
+    {"suite": "work-precision", "case": "peers", "method": "newton", "status": "newton left out"},
     line("picture", "jaxphys", 240, 1e-3, 0.01),
     line("gradient", "jaxphys", 64, 1e-6, 0.5),
 ]  # fmt: skip
@@ -92,7 +95,33 @@ def test_the_report_is_made_of_lines_alone_and_is_the_same_again(tmp_path):
     assert "a processor, 2 cores, jax 0.0, commit abc" in page
     assert "| bar | 8, 16, 32 | 1.6e-02, 3.9e-03, 9.8e-04 | exact | 2 | 2.00 |" in page
     assert "out of memory" in page and "failed" in page
+    assert "| genesis | 1.0e-02, 0.2 s |" in page and "newton left out" not in page
     before = {one.name: one.read_bytes() for one in out.iterdir()}
     assert set(before) == {"README.md", "error-time.svg", "variants.svg", "profile.svg"}
     write_report(folder, out)
     assert {one.name: one.read_bytes() for one in out.iterdir()} == before
+
+
+def test_what_parts_cost(tmp_path):
+    """The ratio of the lines, with its spread; parts without lines are named, not left out."""
+    from benchmarks.report_leave_out import leave_out_page
+
+    def of(part, method, compiled, peak):
+        return {
+            "suite": "leave-out", "case": part, "method": method, "status": "ok", "cells": 20,
+            "compile_seconds": compiled, "peak_bytes": peak,
+            "machine": {"processor": "a processor"},
+        }  # fmt: skip
+
+    lines = [
+        of("walls", "jaxphys", 3.0, 120), of("walls", "smallest", 2.0, 100),
+        {"suite": "leave-out", "case": "walls", "method": "jaxphys", "cost": 1.254,
+         "cost_low": 1.2, "cost_high": 1.3},
+        {**of("ball", "jaxphys", 1.0, 1), "status": "exit 1"}, of("ball", "smallest", 2.0, 100),
+    ]  # fmt: skip
+    path = tmp_path / "leave-out.jsonl"
+    path.write_text("".join(json.dumps(one) + "\n" for one in lines))
+    page = leave_out_page(path, ["walls", "ball", "gradient"])
+    assert "| walls | 1.25 (1.20 to 1.30) | 1.50 | 1.20 |" in page
+    assert "Not measured yet: ball, gradient." in page
+    assert "64,000 neo-Hookean particles" in page and "(a processor)" in page

@@ -11,10 +11,10 @@ import pytest
 from jaxphys.problems.catalogue import PROBLEMS
 from jaxphys.problems.channel import Bingham, Poiseuille
 from jaxphys.problems.disc import Disc
-from jaxphys.problems.discrete import observed_order, solve
+from jaxphys.problems.discrete import displacement_errors, observed_order, solve
 from jaxphys.problems.granular import Grains
 from jaxphys.problems.kinematics import body_acceleration, deformation_gradient
-from jaxphys.problems.ringing import Ringing, displacements
+from jaxphys.problems.ringing import Ringing, displacements, ringing
 
 
 def error(name, resolution, **wrong):
@@ -80,19 +80,30 @@ def test_the_spinning_disc_balances_momentum():
     assert edge < 1e-3 * abs(float(stress(F)[0, 0]))
 
 
-def test_the_ringing_reference_has_converged_and_is_the_linear_wave_when_it_is_quiet():
+@pytest.mark.parametrize("hencky", [False, True])
+def test_the_ringing_reference_has_converged_and_is_the_linear_wave_when_it_is_quiet(hencky):
     x = np.linspace(0.05, 0.95, 7)
     X = np.stack([x, x, x])
-    truth = Ringing()
+    truth = Ringing(hencky=hencky)
     twice = displacements(truth, X, modes=96, steps=4000)
     assert np.abs(displacements(truth, X) - twice).max() < 1e-8
-    quiet = Ringing(speed=1e-5)
+    quiet = Ringing(speed=1e-5, hencky=hencky)
     time = quiet.duration * quiet.wave_speed
     linear = 1e-5 / np.pi * np.sin(np.pi * time) * np.cos(np.pi * x)
     np.testing.assert_allclose(displacements(quiet, X)[0], linear, rtol=1e-4, atol=1e-12)
     # Control: at its own amplitude the wave is no longer that one.
     loud = displacements(truth, X)[0] * 1e-5 / truth.speed
     assert np.abs(loud - linear).max() > 0.02 * np.abs(linear).max()
+
+
+def test_the_ringing_cube_converges_under_henckys_law_to_its_own_wave():
+    coarse, fine = (ringing(Ringing(hencky=True), cells) for cells in (4, 8))
+    end = solve(fine)
+    error = displacement_errors(fine, end)[0]
+    assert 1.5 < np.log2(displacement_errors(coarse, solve(coarse))[0] / error) < 2.5
+    # Control: the other law's wave is another one.
+    other = replace(fine, exact=ringing(Ringing(), 8).exact)
+    assert displacement_errors(other, end)[0] > 1.5 * error
 
 
 def test_the_angle_of_grains_is_that_of_plane_strain():

@@ -123,3 +123,29 @@ def test_what_fractures_breaks_into_pieces():
     pieces = partial(number_of_pieces, radius=1.1 * SPACING, minimum_size=len(position) // 50)
     assert pieces(position[damage < 1]) >= 2
     assert 0.05 < np.mean(damage >= 1) < 0.5
+
+
+def heights(name, *frames, spacing=0.1):
+    """How high a ball in the material's scene reaches above the floor at its middle [m], at the
+    start and after these numbers of frames.
+    """
+    scene = default_scene(name, spacing=spacing)
+    simulation, _ = build(scene, hollow_ball())
+    start = np.asarray(simulation.state.position).T
+    middle = np.linalg.norm(start[:, :2] - scene.objects[0].centre[:2], axis=1) < 0.1
+    ends = (np.asarray(run(simulation, count).position).T for count in frames)
+    return [at[middle, 2].max() - scene.ground.height for at in (start, *ends)]
+
+
+def test_foam_keeps_its_dent_for_a_while_and_loses_it():
+    # The bar leaves it at some 1.1 s; then it comes back to where its own weight lets it.
+    start, pressed, soon, late = heights("memory-foam", 20, 34, 96)
+    assert pressed < 0.7 * start and late > pressed + 0.15
+    assert soon < late - 0.2 * (late - pressed)
+
+
+def test_muscle_shortens_and_lengthens_again():
+    """Contracted after 0.4 s and slack after 0.8 s."""
+    start, short, long = heights("muscle", 10, 19)
+    assert short < 0.85 * start
+    assert long > short + 0.1 * start

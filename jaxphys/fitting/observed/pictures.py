@@ -56,11 +56,11 @@ class Seen(Observed):
         if pictures.shape != wanted:
             raise self.fail("frames", f"has shape {pictures.shape}, expected {wanted} (cameras, "
                             "times, height, width)")  # fmt: skip
-        for camera, frames in enumerate(pictures):
-            refuse_not_finite(self, f"frames[{camera}]", frames)
+        for number, frames in enumerate(pictures):
+            refuse_not_finite(self, f"frames[{number}]", frames)
             if frames.min() < 0 or frames.max() > 1:
                 wrong = np.argmax((frames.min(axis=(1, 2)) < 0) | (frames.max(axis=(1, 2)) > 1))
-                raise self.fail(f"frames[{camera}]", f"frame {wrong} has values outside of [0, 1]")
+                raise self.fail(f"frames[{number}]", f"frame {wrong} has values outside of [0, 1]")
 
     def noise_of(self, simulation):
         return self.noise or self.expected

@@ -40,7 +40,8 @@ _CAUSES = {
     ),
     LEFT_GRID: (
         "left the grid",
-        "enlarge the domain, or add a boundary that holds particles inside",
+        "enlarge the domain, add a boundary that holds particles inside, or let one through which "
+        "soft matter sank act on nodes (acts_on)",
     ),
     STEP_TOO_LARGE: (
         "moved more than one cell, or was deformed by more than its own size, in one step",
@@ -56,7 +57,8 @@ _CAUSES = {
     ),
     COLLAPSED: (
         "was pressed to less than a thousandth of its volume",
-        "take a stiffer material, less force, or a smaller dt",
+        "take a stiffer material, less force, a smaller dt, or for elastic or jelly the law "
+        "neo-Hookean (--set law=neo-Hookean), which resists without bound",
     ),
     UNSTABLE_STEP: (
         "is stiffer than the step allows",

@@ -12,6 +12,7 @@ from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
 from jaxphys.mpm.materials.cohesion import WET_SAND
+from jaxphys.mpm.materials.contraction import CONTRACTING_FIBRES
 from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
 from jaxphys.mpm.materials.fibres import FIBRES
 from jaxphys.mpm.materials.fluid import FLUID
@@ -32,9 +33,9 @@ class Material:
     Attributes:
         name: what users call it.
         law: what it does.
-        others: laws with the same parameters that it may have instead.
+        others: laws that it may have instead; they read the same parameters or fewer.
         description: one line.
-        defaults: of every parameter of its laws (SI), and `density`.
+        defaults: of every parameter of its law (SI), and `density`.
     """
 
     name: str
@@ -50,10 +51,12 @@ class Material:
 
     @property
     def declared(self) -> dict[str, Parameter]:
-        """Every parameter that may be given, by name: those with defaults first."""
+        """Every parameter that its law reads and that may be given, by name: those with defaults
+        first.
+        """
         own = {parameter.name: parameter for parameter in (*self.law.declared, DENSITY)}
         others = {name: other.parameter for name, other in self.alternatives.items()}
-        return {name: own[name] for name in self.defaults} | others
+        return {name: own[name] for name in self.defaults if name in own} | others
 
 
 def _material(
@@ -182,19 +185,22 @@ _materials: dict[str, Material] = {
             youngs_modulus=5e3,
             poisson_ratio=0.05,
             relaxing_modulus=2.5e4,
-            relaxation_time=0.05,
+            relaxation_time=0.15,
             density=200.0,
         ),
         _material(
             "muscle",
-            FIBRES,
-            "soft across its fibres, stiff along them (neo-Hookean, Holzapfel's fibres)",
+            CONTRACTING_FIBRES,
+            "shortens and thickens, again and again (neo-Hookean, Holzapfel's fibres, which pull)",
+            others=(FIBRES,),
             youngs_modulus=6e3,
             poisson_ratio=0.4,
             fibre_stiffness=5e4,
             fibre_stiffening=1.0,
             fibre_azimuth=0.0,
-            fibre_elevation=0.0,
+            fibre_elevation=90.0,
+            fibre_tension=5e3,
+            contraction_period=0.8,
             density=300.0,
         ),
     )

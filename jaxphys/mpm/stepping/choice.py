@@ -1,11 +1,16 @@
 """Whether a scene should take explicit or implicit steps, and why: an estimate of the work of both.
 
-An explicit step is one pass. An implicit one is Newton's method, each iteration of which solves a
-linear system in as many passes as a wave needs steps to go where it must: the cells of the longest
-path through the body, or fewer where the step is shorter than that takes. So implicit steps pay
+An explicit step is one pass. An implicit one is Newton's method with conjugate gradients, whose
+products are one pass each. How many was counted (docs/stepping.md): with the root of the step's
+length in explicit ones, until it no longer grows, sooner in a small body. So implicit steps pay
 where what one sees moves slowly beside sound: at rest, under slow loads, in metal.
+
+The estimate is that of steps in which something happens. At rest the motion goes on as it was, and
+a step takes less, down to a fifth. Of stiff matter that slides to a stop, or rings on a floor with
+friction by the midpoint rule, a step takes more.
 """
 
+import math
 from typing import NamedTuple
 
 import jax
@@ -13,14 +18,14 @@ import jax.numpy as jnp
 from jax import Array
 
 from jaxphys.mpm.state import Config, Model, State
-from jaxphys.mpm.stepping.bounds import fastest, largest_stable_dt
+from jaxphys.mpm.stepping.bounds import largest_stable_dt
 from jaxphys.mpm.stepping.fixed import SAFETY
-from jaxphys.mpm.stepping.implicit import ADVECTION
+from jaxphys.mpm.stepping.implicit import crossing_time
 
-ITERATIONS = 3  # of Newton's method in a step
-OTHERS = 5  # passes of a Newton iteration and of a step, besides the linear system
-PRODUCTS = 2.0  # of a linear system for each cell of the longest path
-MARGIN = 2.0  # by which implicit steps must be cheaper to be advised: they are less accurate
+PRODUCTS = 5.0  # of a step, times the root of its length in explicit steps
+ENOUGH = 50.0  # explicit steps, times the square of cells, from which on there are no more
+OTHERS = 12  # passes of a step besides: evaluations, second derivatives, start and end
+MARGIN = 1.5  # by which implicit steps must be cheaper to be advised: they are less accurate
 
 
 class Choice(NamedTuple):
@@ -55,8 +60,8 @@ def advised(explicit_dt: float, implicit_dt: float, cells: float, time: float) -
     length = min(implicit_dt, time)
     ratio = length / explicit_dt
     explicit = time / explicit_dt
-    products = PRODUCTS * min(cells, ratio)
-    implicit = time / length * ITERATIONS * (products + OTHERS)
+    products = PRODUCTS * math.sqrt(min(ratio, ENOUGH * cells**2))
+    implicit = time / length * (products + OTHERS)
     pays = MARGIN * implicit < explicit
     about = f"an implicit step is {ratio:.3g} explicit ones long and costs about " + (
         f"{implicit * length / time:.3g} of them ({cells:.3g} cells along the longest path)"
@@ -67,13 +72,16 @@ def advised(explicit_dt: float, implicit_dt: float, cells: float, time: float) -
 
 
 @jax.jit(static_argnums=0)
-def _speed_and_span(config: Config, model: Model, state: State) -> tuple[Array, Array]:
+def _length_and_span(config: Config, model: Model, state: State) -> tuple[Array, Array]:
     span = jnp.max(state.position, axis=1) - jnp.min(state.position, axis=1)
-    return fastest(config, model, state), jnp.max(span)
+    speed = jnp.sqrt(jnp.max(jnp.sum(state.velocity**2, axis=0)))
+    for boundary in model.boundaries:
+        speed = jnp.maximum(speed, boundary.fastest().astype(speed.dtype))
+    return crossing_time(config.grid.spacing, speed, model.gravity), jnp.max(span)
 
 
 def which_stepping(config: Config, model: Model, state: State, time: float) -> Choice:
-    """What to take for a scene as it is now. Runs on the host.
+    """What to take for a scene as it is now: at the speeds that it has. Runs on the host.
 
     time: between frames [s].
 
@@ -81,7 +89,6 @@ def which_stepping(config: Config, model: Model, state: State, time: float) -> C
         InputError: the state is not finite.
     """
     bounds = largest_stable_dt(config, model, state)
-    speed, span = (float(x) for x in _speed_and_span(config, model, state))
-    dx = config.grid.spacing
-    longest = ADVECTION * dx / speed if speed > 0 else float("inf")
-    return advised(SAFETY * float(bounds.dt), longest, max(span / dx, 1.0), time)
+    longest, span = (float(x) for x in _length_and_span(config, model, state))
+    cells = max(span / config.grid.spacing, 1.0)
+    return advised(SAFETY * float(bounds.dt), longest, cells, time)

@@ -12,6 +12,9 @@ once a step and are elastic within it.
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import jax.numpy as jnp
+from jax import Array
+
 from jaxphys.core.fields import DURATION, Checked, between
 
 ADVECTION = 0.6  # cells that a particle may cross in a step (Wang et al. 2020)
@@ -49,3 +52,14 @@ class Implicit(Checked):
     dt: float | None = field(default=None, metadata=DURATION)
     most_steps: int | None = field(default=None, metadata=between(1, 1_000_000))
     adjoint_tolerance: float | None = field(default=None, metadata=SHARE)
+
+
+def crossing_time(spacing: float, speed: Array, gravity: Array | None) -> Array:
+    """How long a step may be [s], (), so that what moves at `speed` [m/s], (), and falls by
+    `gravity` [m/s^2], (3,), crosses ADVECTION cells of `spacing` [m].
+    """
+    # dt (speed + g dt) = ADVECTION dx
+    g = 0.0 if gravity is None else jnp.sqrt(jnp.sum(gravity**2))
+    room = ADVECTION * spacing
+    tiny = jnp.finfo(speed.dtype).tiny ** 0.5
+    return 2 * room / (speed + jnp.sqrt(speed**2 + 4 * g * room) + tiny)

@@ -1,6 +1,8 @@
 """Which stepping is advised: jelly that falls explicit ones, metal at rest implicit ones."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import jax.numpy as jnp
 import pytest
@@ -8,19 +10,68 @@ import pytest
 from jaxphys.mpm.stepping.choice import advised, which_stepping
 from tests.mpm.cases import block
 
+COUNTED = Path(__file__).parents[3] / "benchmarks/lines/implicit.jsonl"
+
 
 def test_work_is_counted_in_passes():
-    """A step 1000 times the explicit one through 10 cells: three iterations of 20 and 5 passes."""
+    """A step 1000 times the explicit one through 10 cells: 5 sqrt(1000) products, 12 passes. Of
+    3 cells it takes no more than one 450 times as long.
+    """
     choice = advised(explicit_dt=1e-5, implicit_dt=1e-2, cells=10, time=1.0)
     assert choice.explicit == pytest.approx(1e5)
-    assert choice.implicit == pytest.approx(100 * 3 * 25)
+    assert choice.implicit == pytest.approx(100 * (5 * 31.623 + 12), rel=1e-4)
     assert choice.stepping == "implicit" and "1e+03 explicit" in choice.reason
+    small = advised(explicit_dt=1e-5, implicit_dt=1e-2, cells=3, time=1.0)
+    assert small.implicit == pytest.approx(100 * (5 * 21.213 + 12), rel=1e-4)
 
 
 def test_short_implicit_steps_do_not_pay():
     """Where speeds allow ten explicit steps at once, a solve costs more than these."""
     choice = advised(explicit_dt=1e-3, implicit_dt=1e-2, cells=10, time=1.0)
     assert choice.stepping == "explicit" and choice.implicit > choice.explicit
+
+
+CELLS = {"block": 3, "beam": 8, "press": 3, "inclusion": 4}
+SECONDS = {"block": 0.3, "beam": 0.4, "press": 0.3, "inclusion": 0.3}
+LINES = [json.loads(line) for line in COUNTED.read_text().splitlines()]
+
+
+def counted(method, *scenes):
+    """(line, explicit steps in its time, what is advised for its steps) of runs of 16 steps."""
+    explicit = {(x["scene"], x["modulus"]): x["steps"] for x in LINES if x["method"] == "explicit"}
+    for line in LINES:
+        scene = line["scene"]
+        if line["method"] != method or scene not in scenes or line["least"] != 16:
+            continue
+        steps, time = explicit[scene, line["modulus"]], SECONDS[scene]
+        dt = time / line["steps"]
+        yield line, steps, advised(time / steps, dt, CELLS[scene], time)
+
+
+@pytest.mark.parametrize(
+    ("method", "scenes"),
+    [("backward-euler", ("press", "inclusion")), ("midpoint", ("beam", "press", "inclusion"))],
+)
+def test_what_moves_takes_what_is_estimated(method, scenes):
+    """Within a factor of two of what was counted, from 1 MPa to 10 GPa; the inclusion meets a floor
+    with friction.
+    """
+    found = [(line["passes"], choice.implicit) for line, _, choice in counted(method, *scenes)]
+    assert len(found) == 5 * len(scenes)
+    ratios = [estimate / passes for passes, estimate in found]
+    assert min(ratios) > 0.5 and max(ratios) < 2
+
+
+def test_what_comes_to_rest_takes_less_and_the_advice_is_right_where_it_is_clear():
+    """Of a block on a floor with friction, and a beam, by backward Euler: both are at rest soon."""
+    clear = 0
+    for line, steps, choice in counted("backward-euler", *SECONDS):
+        assert line["passes"] < 2 * choice.implicit
+        gain = steps / line["passes"]
+        if not 0.8 < gain < 3:
+            clear += 1
+            assert choice.stepping == ("implicit" if gain > 1 else "explicit"), line
+    assert clear > 8
 
 
 def test_no_step_is_longer_than_what_is_asked_for():

@@ -296,6 +296,24 @@ def test_a_stiff_block_comes_to_rest(stiff):
     assert np.abs(strain).max() < 1e-3
 
 
+def test_rest_costs_little_however_stiff():
+    """In float64 friction holds metal too, and once the block has landed a step takes few products:
+    from velocities that its floor would have to stop it took hundreds.
+    """
+    run = None
+    for modulus in (1e8, 1e11):
+        config, model, state = resting(jnp.float64, modulus)
+        run = run or jax.jit(partial(implicit_rollout, config, stepping=STIFF))
+        after, counts = state, []
+        for _ in range(10):
+            after, report = run(model, after, time=0.02)
+            counts.append(int(report.effort.products))
+        check(after.status)
+        moved = np.asarray(after.position - state.position)
+        assert np.abs(moved[:2]).max() < 8e-3 and np.abs(after.velocity).max() < 1e-4
+        assert max(counts) > 40 and max(counts[5:]) < 40
+
+
 def test_one_that_cannot_be_solved_is_told(stiff):
     """Here because float32 has no number for its energy. Steps are halved down to a thousandth."""
     model, state, run = stiff

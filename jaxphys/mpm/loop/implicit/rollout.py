@@ -24,7 +24,7 @@ from jaxphys.mpm.state import (
     State,
     Status,
 )
-from jaxphys.mpm.stepping.implicit import ADVECTION, GRADIENT, GROWTH, MOST_STEPS, Implicit
+from jaxphys.mpm.stepping.implicit import GRADIENT, GROWTH, MOST_STEPS, Implicit, crossing_time
 
 PLAIN, DEFAULT = Plain(), Implicit()
 
@@ -165,12 +165,8 @@ def _speed_limit(config: Config, model: Model, flows: tuple[Flow, ...]) -> Array
     speed = jnp.sqrt(jnp.max(jnp.stack([jnp.max(_squares(f.velocity, 1)) for f in flows])))
     rates = [jnp.max(_squares(f.moment, (1, 2))) for f in flows]
     rate = 4 / dx**2 * jnp.sqrt(jnp.max(jnp.stack(rates)))
-    # dt (speed + g dt) = ADVECTION dx
-    g = 0.0 if model.gravity is None else jnp.sqrt(jnp.sum(model.gravity**2))
-    room = ADVECTION * dx
     tiny = jnp.finfo(speed.dtype).tiny ** 0.5
-    crossing = 2 * room / (speed + jnp.sqrt(speed**2 + 4 * g * room) + tiny)
-    return jnp.minimum(crossing, GRADIENT / (rate + tiny))
+    return jnp.minimum(crossing_time(dx, speed, model.gravity), GRADIENT / (rate + tiny))
 
 
 def _squares(x: Array, axes) -> Array:

@@ -35,7 +35,8 @@ from jaxphys.mpm.loop.implicit.passes import (
 from jaxphys.mpm.state import Config
 from jaxphys.mpm.stepping.implicit import Implicit
 
-HALVINGS = 12  # of a Newton step, before it counts as none
+TRIALS = 12  # of shares of a Newton step, before it counts as none
+SHORTER = 0.5  # times the last one at most is the next share
 LOOSEST = 0.5  # relative residual with which a linear system is left
 SHARE = 0.3  # of the tolerance that is enough for a linear system
 ROUNDING = 64  # of these may an energy rise by
@@ -146,54 +147,67 @@ class Search(NamedTuple):
     """Newton's method on its way.
 
     Attributes:
-        at: the best point so far, in the beginning none.
-        strain: `characteristic` of its free residual; goal: what it must fall to.
+        at: the best point so far.
+        strain: `characteristic` of its free residual.
         direction: (M, 4), along which the next point lies; share: how far.
-        taken: points that were better than the one before; -1 before the first.
-        halvings: of this direction.
+        trials: of this direction.
+        turns: whether a new direction comes next; lost: because this one did not help.
         convex: whether negative curvature was left out of it.
-        stuck: whether no direction helps; spent: whether the iterations are.
+        stuck: whether no direction helps.
         effort: so far.
     """
 
     at: Point
     strain: Array
-    goal: Array
     direction: Array
     share: Array
-    taken: Array
-    halvings: Array
+    trials: Array
+    turns: Array
+    lost: Array
     convex: Array
     stuck: Array
-    spent: Array
     effort: Effort
 
 
 def newton(config: Config, stepping: Implicit, problem: Problem) -> tuple[Array, Array, Effort]:
     """(velocities (M, 4), whether they solve the problem (), what it took).
 
-    A residual must be small beside stiffness, beside what it was and beside gravity: of stiff
-    matter gravity itself, and friction with it, is a small one, and so it is beside what a floor
-    gives that a step would pass. To what rounding lets one see, one step is taken in any case.
+    It starts from the velocities before the step or from those without stress, whichever have less
+    energy: matter at rest is where it will be, matter that falls falls on.
 
-    Along a direction steps are halved until the energy is one and does not rise, or by no more than
-    rounding while the residual falls.
+    A residual must be small beside stiffness, and beside what changes the motion: gravity, or what
+    is unbalanced in the beginning. Of stiff matter both are small ones, and friction with them.
+    Where rounding ends it sooner, one step is taken in any case.
+
+    Along a direction steps are shortened until the energy is one and does not rise, or by no more
+    than rounding while the residual falls: to where the slopes at both ends say that it is least,
+    since a surface that is met may be a million times stiffer than what was before it.
     """
     nodes = problem.nodes
     eps = float(jnp.finfo(nodes.mass.dtype).eps)
     # Where rounding ends it, the reduction need not be reached.
     rounded = max(stepping.tolerance, NOISE * eps)
+
+    def strained(found: Point):
+        return characteristic(nodes, project(nodes, found.residual))
+
+    starts = jnp.stack([allowed(nodes, rows) for rows in (nodes.before, nodes.target)])
+    both = jax.lax.map(partial(point, config, problem), starts)
+    before, falling = (jax.tree.map(lambda x, k=k: x[k], both) for k in (0, 1))
+    falls = falling.sound & (~before.sound | (falling.energy < before.energy))
+    first = jax.tree.map(partial(jnp.where, falls), falling, before)
     loads = characteristic(nodes, project(nodes, nodes.mass * (nodes.target - nodes.before)))
-    enough = jnp.where(
-        loads > 0, jnp.minimum(stepping.tolerance, LOADS * loads), stepping.tolerance
-    )
+    changes = jnp.maximum(LOADS * loads, stepping.reduction * strained(first))
+    enough = jnp.minimum(stepping.tolerance, changes)
+    goal = jnp.maximum(enough, FAINTEST * eps)
 
     def solved(s: Search):
-        ends = (s.strain <= s.goal) & (s.taken > 0)
+        ends = (s.strain <= enough) | ((s.strain <= goal) & (s.effort.newton > 0) & s.turns)
         return s.at.sound & (ends | (s.stuck & (s.strain <= rounded)))
 
     def going(s: Search):
-        return ~s.stuck & ~s.spent & ~solved(s)
+        spent = s.turns & (s.effort.newton >= stepping.newton)
+        return s.at.sound & ~s.stuck & ~spent & ~solved(s)
 
     def better(found: Point, strain, s: Search):
         slack = ROUNDING * eps * s.at.size
@@ -201,49 +215,44 @@ def newton(config: Config, stepping: Implicit, problem: Problem) -> tuple[Array,
         level = (found.energy <= s.at.energy + slack) & (strain < s.strain)
         return found.sound & (falls | level)
 
+    def turned(s: Search) -> Search:
+        return _turned(config, stepping, problem, goal, s)
+
     def body(s: Search):
+        s = jax.lax.cond(s.turns, turned, lambda s: s, s)
         found = point(config, problem, s.at.velocities + s.share * s.direction)
-        strain = characteristic(nodes, project(nodes, found.residual))
+        strain = strained(found)
         good = better(found, strain, s)
-        least = jnp.minimum(enough, stepping.reduction * strain)
-        goal = jnp.where(s.taken < 0, jnp.maximum(least, FAINTEST * eps), s.goal)
-        s = s._replace(
+        # Where rounding is all that is left no part of a direction helps, and where it has no
+        # negative curvature no other does.
+        ends = s.strain <= goal
+        lost = ~good & (ends | (s.trials >= TRIALS))
+        here, there = (jnp.vdot(s.direction, x.residual) for x in (s.at, found))
+        meets = found.sound & (here < 0) & (there > here)
+        least = jnp.where(meets, here / jnp.where(meets, here - there, -1), SHORTER)
+        return s._replace(
             at=jax.tree.map(partial(jnp.where, good), found, s.at),
             strain=jnp.where(good, strain, s.strain),
-            goal=goal,
-            taken=s.taken + good.astype(jnp.int32),
-            share=0.5 * s.share,
-            halvings=s.halvings + 1,
+            share=jnp.minimum(least, SHORTER) * s.share,
+            trials=s.trials + 1,
+            turns=good | lost,
+            lost=lost,
+            stuck=lost & (s.convex | ends),
             effort=s.effort._replace(evaluations=s.effort.evaluations + 1),
         )
-        # The start has no direction to halve; where rounding is all that is left, none helps; one
-        # without negative curvature is the last to try.
-        ends = (s.taken < 0) | (s.at.sound & (s.strain <= s.goal))
-        lost = ~good & (ends | (s.halvings >= HALVINGS))
-        turns = (good | lost) & ~solved(s)
-        stuck = lost & (s.convex | ends)
-        spent = s.spent | (turns & (s.effort.newton >= stepping.newton))
-        return jax.lax.cond(
-            turns & ~stuck & ~spent,
-            partial(_turned, config, stepping, problem, lost),
-            lambda s: s._replace(stuck=stuck, spent=spent),
-            s,
-        )
 
-    nothing = allowed(nodes, nodes.target)
-    zero, none, no = jnp.zeros_like(nodes.scale[0, 0]), jnp.zeros((), jnp.int32), jnp.array(False)
+    none, no = jnp.zeros((), jnp.int32), jnp.array(False)
     start = Search(
-        at=Point(nothing, zero + jnp.inf, zero, no, jnp.zeros_like(nothing)),
-        strain=zero + jnp.inf,
-        goal=zero,
-        direction=jnp.zeros_like(nothing),
-        share=zero + 1,
-        taken=none - 1,
-        halvings=none,
+        at=first,
+        strain=strained(first),
+        direction=jnp.zeros_like(first.velocities),
+        share=jnp.ones_like(goal),
+        trials=none,
+        turns=~no,
+        lost=no,
         convex=no,
         stuck=no,
-        spent=no,
-        effort=Effort.none(),
+        effort=Effort.none()._replace(evaluations=none + len(starts)),
     )
     end = jax.lax.while_loop(going, body, start)
     return _balanced(problem, end.at), solved(end), end.effort
@@ -261,14 +270,14 @@ def _balanced(problem: Problem, at: Point) -> Array:
     return jnp.where(nodes.filled, at.velocities - shift, at.velocities)
 
 
-def _turned(config, stepping, problem, convex, s: Search) -> Search:
-    """With the direction of a further Newton step; convex: () bool, whether to leave out negative
-    curvature from the first.
+def _turned(config, stepping, problem, goal, s: Search) -> Search:
+    """With the direction of a further Newton step to a strain of `goal` (); without negative
+    curvature from the first where the last direction was lost.
     """
     nodes = problem.nodes
     norm = partial(characteristic, nodes)
     forcing = jnp.clip(jnp.sqrt(s.strain), SHARE * stepping.reduction, LOOSEST)
-    enough = jnp.where(s.strain > s.goal, SHARE * s.goal, 0)
+    enough = jnp.where(s.strain > goal, SHARE * goal, 0)
     goal = jnp.maximum(forcing * s.strain, enough)
 
     def body(carry):
@@ -290,14 +299,14 @@ def _turned(config, stepping, problem, convex, s: Search) -> Search:
     def going(carry):
         return ~carry[2]
 
-    start = (s.direction, convex, jnp.array(False), s.effort)
+    start = (s.direction, s.lost, jnp.array(False), s.effort)
     direction, _, _, effort = jax.lax.while_loop(going, body, start)
     tried = effort.newton - s.effort.newton
     return s._replace(
         direction=direction,
         share=jnp.ones_like(s.share),
-        halvings=jnp.zeros_like(s.halvings),
-        convex=convex | (tried > 1),
+        trials=jnp.zeros_like(s.trials),
+        convex=s.lost | (tried > 1),
         effort=effort,
     )
 

@@ -1,0 +1,1 @@
+"""From photographs with known cameras to Gaussians: captures, losses, the optimisation."""
