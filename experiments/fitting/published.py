@@ -146,7 +146,7 @@ def cases(quick: bool) -> Cases:
 
 
 def _number(value: float | None) -> str:
-    return "?" if value is None else f"{value:.3g}"
+    return "?" if value is None else f"{value:.4g}"
 
 
 def table(lines: list[Line]) -> str:
