@@ -4,6 +4,7 @@ from .evaluation import Evaluator as Evaluator
 from .evaluation import Memory as Memory
 from .fit import Stage as Stage
 from .fit import fit as fit
+from .fit import solved as solved
 from .free import Angle as Angle
 from .free import Bounded as Bounded
 from .free import Field as Field

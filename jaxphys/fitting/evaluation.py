@@ -13,10 +13,13 @@ import jax
 import numpy as np
 
 from jaxphys.core.checkpoints import Checkpoints
+from jaxphys.fitting.motion import TooManySteps
 from jaxphys.fitting.problem import Problem, Program
-from jaxphys.mpm.state import OK
+from jaxphys.mpm.state import NOT_FINITE, OK, STEP_TOO_LARGE, UNSTABLE_STEP
 
 EVERY = 15.0  # seconds between savings, at least
+SHORTER = {NOT_FINITE, STEP_TOO_LARGE, UNSTABLE_STEP}  # failures that shorter steps may avoid
+MOST_DOUBLED = 4  # times the steps that the bounds ask for
 KINDS = ("loss", "gradient", "normal")
 
 
@@ -130,16 +133,30 @@ class Evaluator:
         row = self.memory.recall(kind, vector, frames)
         if row is None:
             answer = self._computed(kind, vector, frames)
+            if self._program is not None:
+                answer["program"] = np.array([self._program.steps, *self._program.capacities])
             self.memory.keep(kind, vector, frames, **answer)
             row = {name: np.asarray(value) for name, value in answer.items()}
             self._watch()
+        elif "program" in row:
+            # What a trial takes depends on the program before it: the same as if asked again.
+            steps, *capacities = (int(n) for n in row["program"])
+            self._program = Program(steps, tuple(capacities))
         loss = float(row["loss"])
         slope = row.get("slope", np.zeros(size))
         return loss, slope, row.get("gram", np.zeros((size, size)))
 
     def _computed(self, kind: str, vector: np.ndarray, frames: int) -> dict[str, Any]:
+        failed: dict[str, Any] = {"loss": np.float64(np.inf)}
+        if kind != "loss":
+            failed["slope"] = np.zeros(len(vector))
         data = self.data()
-        program = self.program(vector)
+        try:
+            program = self.program(vector)
+        except TooManySteps:
+            if self._program is None:
+                raise  # where the fit starts
+            return failed
         while True:
             function = self.problem.call(kind, program)
             found = jax.device_get(function(self.problem.cast(vector), data, frames))
@@ -147,14 +164,26 @@ class Evaluator:
             if np.isfinite(parts[0]):
                 names = ("loss", "slope", "gram")
                 return {n: np.asarray(p, np.float64) for n, p in zip(names, parts, strict=False)}
-            larger = self._with_room(vector, program)
+            larger = self._with_room(vector, program) or self._with_steps(vector, program)
             if larger is None:
                 break
             program = self._program = larger
-        failed: dict[str, Any] = {"loss": np.float64(np.inf)}
-        if kind != "loss":
-            failed["slope"] = np.zeros(len(vector))
         return failed
+
+    def _with_steps(self, vector: np.ndarray, program: Program) -> Program | None:
+        """A program with twice the steps, if steps were too long for what the motion became: matter
+        stiffens as it is pressed, which the bounds at its start do not foresee.
+        """
+        if self.problem.steps is not None:
+            return None
+        motion, _ = self.problem.call("motion", program)(
+            self.problem.cast(vector), len(self.problem.times)
+        )
+        codes = set(np.asarray(motion.status.code).tolist()) - {OK}
+        fewest = self.problem.program(vector, Program(0, program.capacities)).steps
+        if not codes or codes - SHORTER or 2 * program.steps > MOST_DOUBLED * fewest:
+            return None
+        return Program(2 * program.steps, program.capacities)
 
     def _with_room(self, vector: np.ndarray, program: Program) -> Program | None:
         """A program with more room, if the pictures of a sound motion lacked it."""

@@ -28,6 +28,8 @@ from jaxphys.scene.scene import Scene
 from jaxphys.scene.source import load_object
 
 MOST_INTERVALS = 64  # numbers up to which a fit says how sure it is of each
+GROWING = 0.5, 0.75  # of the times, that Gauss-Newton sees before it sees all
+FEWEST_TIMES = 6  # for that
 FIRST_FRAMES = 1 / 3  # of the times, in which what the motion started with is found
 
 
@@ -63,6 +65,7 @@ def fit(
     seed: int = 0,
     level: float = 0.9,
     adjoint: Adjoint = CHECKPOINTED,
+    steps: int | None = None,
     memory: Memory | None = None,
     watch: Callable[[], None] | None = None,
 ) -> Fit:
@@ -85,12 +88,15 @@ def fit(
             of a simulation any time.
         search: None: what suits the number of free numbers; `Fit.search` says which and why.
         stages: None: what the motion starts with (velocity, ...) from the first third of the times,
-            where something else is free as well, then all from all of them.
+            where something else is free as well, then all from all of them, to which
+            Gauss-Newton comes by a half and three quarters of them.
         starts: so many places to start from are tried, all but the first drawn around it, a step
             that is much away; the fit goes on from the best.
         seed: of those.
         level: of the intervals.
         adjoint: how gradients go back.
+        steps: between two of the times, in every trial: one compilation, and a trial that they
+            are too few for is a wall. None: as many as each trial's numbers need.
         memory: of earlier evaluations, to go on where a fit was stopped.
         watch: called after each evaluation; may raise KeyboardInterrupt.
 
@@ -102,15 +108,35 @@ def fit(
     simulation, look, end = _subject(scene_or_simulation, look, end)
     observations = (observed,) if isinstance(observed, Observed) else tuple(observed)
     numbers = layout(free, simulation, look)
-    asked = problem(simulation, numbers, observations, look=look, end=end, adjoint=adjoint)
-    pictures = any(isinstance(one, Seen) for one in observations)
+    asked = problem(
+        simulation, numbers, observations, look=look, end=end, adjoint=adjoint, steps=steps
+    )
+    return solved(asked, search, stages, starts, seed, level, memory, watch)
+
+
+def solved(
+    asked: Problem,
+    search: Search | None = None,
+    stages: Sequence[Stage] | None = None,
+    starts: int = 1,
+    seed: int = 0,
+    level: float = 0.9,
+    memory: Memory | None = None,
+    watch: Callable[[], None] | None = None,
+) -> Fit:
+    """The fit of a problem, with the arguments of `fit`. Problems that differ in nothing but what
+    was seen share their compiled programs (`Problem.observing`).
+    """
+    numbers = asked.layout
+    pictures = any(isinstance(one, Seen) for one in asked.observed)
     suited, why = chosen(numbers.size, asked.squares, pictures)
     if search is not None:
         suited, why = search, "as asked for"
     if suited.type == "gauss-newton" and not asked.squares:
         raise InputError("search: Gauss-Newton needs residuals, and one observation is a loss")
     ask = Evaluator(asked, memory or Memory(), watch)
-    plan = tuple(stages) if stages is not None else default_stages(numbers)
+    given = None if stages is None else tuple(stages)
+    plan = given or default_stages(numbers, suited, len(asked.times))
     vector = _best_start(ask, numbers, starts, seed)
     _refuse_what_nothing_depends_on(ask, vector, suited)
     begun, step, history = vector, Step(vector, np.inf), []
@@ -120,6 +146,8 @@ def fit(
             _known(stage.names, numbers)
             member = numbers.member(stage.names)
         frames = frames_of(asked, stage.share)
+        if number and suited.type == "gauss-newton" and np.isinf(ask.loss(vector, frames)):
+            vector = begun  # what is right in the first frames may fail in later ones
         best: Step | None = None
         for step in (stage.search or suited).run(ask, vector, member, frames):
             history.append(_row(number, step, numbers))
@@ -144,12 +172,18 @@ def _subject(given: Scene | Simulation, look: Look | None, end: float | None):
     return simulation, look or own, end or (given.frames - 1) * given.seconds_per_frame
 
 
-def default_stages(numbers: Layout) -> tuple[Stage, ...]:
-    """What the motion starts with first, where something else is free; then everything."""
+def default_stages(numbers: Layout, search: Search, times: int) -> tuple[Stage, ...]:
+    """What the motion starts with first, where something else is free; then everything.
+
+    Gauss-Newton sees more and more of the times: a long motion that is far off after a contact
+    has slopes that lead nowhere, a short one leads near.
+    """
     state = tuple(e.name for e in numbers.entries if e.name in STATE)
+    growing = search.type == "gauss-newton" and times >= FEWEST_TIMES
+    whole = tuple(Stage(None, share) for share in GROWING if growing)
     if state and len(state) < len(numbers.entries):
-        return Stage(state, FIRST_FRAMES), Stage()
-    return (Stage(),)
+        return Stage(state, FIRST_FRAMES), *whole, Stage()
+    return *whole, Stage()
 
 
 def frames_of(asked: Problem, share: float) -> int:
@@ -258,9 +292,11 @@ def _seen(asked: Problem, vector, data, program: Program):
     return jax.device_get(motion), [np.asarray(part) for part in jax.device_get(residuals)]
 
 
-def _how_sure(asked, vector, data, program, residuals, level) -> Uncertainty:
+def _how_sure(asked, vector, data, program, residuals, level) -> Uncertainty | None:
     normal = asked.call("normal", program)
     _, _, gram = jax.device_get(normal(asked.cast(vector), data, len(asked.times)))
+    if not np.all(np.isfinite(gram)):
+        return None
     parts = [
         one.arranged(part, asked.simulation)
         for one, part in zip(asked.observed, residuals, strict=False)

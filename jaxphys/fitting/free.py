@@ -8,6 +8,7 @@ two bounds, the size of what has none.
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal, get_args
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -35,6 +36,7 @@ class Free:
     """
 
     type: ClassVar[str] = "free"
+    farthest: ClassVar[float] = float("inf")  # place on the line, either way, that a search takes
     start: float | tuple[float, ...]
     per: Per = field(default="scene", kw_only=True)
     groups: np.ndarray | None = field(default=None, kw_only=True, repr=False, metadata={"keys": ()})
@@ -128,6 +130,7 @@ class Bounded(Free):
     """
 
     type: ClassVar[str] = "bounded"
+    farthest: ClassVar[float] = 9.0  # a ten-thousandth of the way from a bound
     low: float = 0.0
     high: float = 1.0
 
@@ -144,11 +147,12 @@ class Bounded(Free):
         return jnp.log(share) - jnp.log1p(-share)
 
     def from_line(self, place):
-        return self.low + (self.high - self.low) / (1 + jnp.exp(-place))
+        return self.low + (self.high - self.low) * jax.nn.sigmoid(place)
 
     def scale(self, value):
         share = (np.asarray(value, np.float64) - self.low) / (self.high - self.low)
-        return 0.1 / np.maximum(share * (1 - share), 1e-3)
+        # Near a bound the slope says little: there 4 goes a tenth of the way, as it is curved.
+        return 0.1 / np.maximum(share * (1 - share), 0.025)
 
 
 @dataclass(frozen=True)

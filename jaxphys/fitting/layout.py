@@ -103,6 +103,12 @@ class Layout:
             found.append(entry.kind.scale(value))
         return np.concatenate(found)
 
+    def farthest(self) -> np.ndarray:
+        """How far from 0 on the line a search goes, either way, (size,)."""
+        return np.concatenate(
+            [np.full(entry.stop - entry.start, entry.kind.farthest) for entry in self.entries]
+        )
+
     def values(self, vector) -> dict[str, Array]:
         """The numbers by name, in the user's units: those of groups and nodes as they are."""
         return {

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jaxphys.core.errors import InputError
 from jaxphys.mpm.loop.adjoint import Adjoint, Checkpointed, for_frames
 from jaxphys.mpm.loop.rollout import rollout
 from jaxphys.mpm.motion import Motion
@@ -14,15 +15,29 @@ from jaxphys.mpm.stepping.bounds import largest_stable_dt
 from jaxphys.mpm.stepping.fixed import SAFETY
 
 CHECKPOINTED = Checkpointed()
+MOST_STEPS = 100_000  # between two of the times
 RUNGS_PER_DOUBLING = 2  # of the numbers of steps that programs are compiled for
+
+
+class TooManySteps(InputError):
+    """Numbers that no simulation would come to the end of."""
 
 
 def steps_for(simulation: Simulation, longest: float) -> int:
     """How many steps an interval of `longest` [s] takes at the simulation's present numbers, the
     next of a ladder of numbers, so that few programs are compiled. On the host.
+
+    Raises:
+        TooManySteps: more than `MOST_STEPS`.
     """
     bounds = largest_stable_dt(simulation.config, simulation.model, simulation.state)
     needed = max(1.0, longest / (SAFETY * bounds.dt))
+    if needed > MOST_STEPS:
+        raise TooManySteps(
+            f"free: these numbers allow steps of {SAFETY * bounds.dt:.3g} s ({bounds.reason}), "
+            f"{needed:.3g} of them between two times; start from softer or less viscous matter, or "
+            "on a coarser grid"
+        )
     return int(np.ceil(2 ** (np.ceil(RUNGS_PER_DOUBLING * np.log2(needed)) / RUNGS_PER_DOUBLING)))
 
 

@@ -7,7 +7,7 @@ to another search.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -18,7 +18,7 @@ from jax import Array
 
 from jaxphys.core.errors import InputError
 from jaxphys.fitting.layout import Layout
-from jaxphys.fitting.motion import CHECKPOINTED, motion_at, some, steps_for
+from jaxphys.fitting.motion import CHECKPOINTED, MOST_STEPS, motion_at, some, steps_for
 from jaxphys.fitting.observed.base import Observed
 from jaxphys.fitting.observed.own import Own
 from jaxphys.fitting.observed.pictures import Seen
@@ -52,6 +52,7 @@ class Problem:
         observed: checked.
         times: of all observations together [s].
         adjoint: for reverse mode.
+        steps: between two of the times; None: as many as the numbers of a trial need.
     """
 
     simulation: Simulation
@@ -60,12 +61,31 @@ class Problem:
     observed: tuple[Observed, ...]
     times: tuple[float, ...]
     adjoint: Adjoint = CHECKPOINTED
+    steps: int | None = None
     _compiled: dict = field(default_factory=dict, repr=False)
 
     @property
     def squares(self) -> bool:
         """Whether the loss is a sum of squares, as Gauss-Newton wants it."""
         return not any(isinstance(one, Own) and one.is_loss for one in self.observed)
+
+    def observing(self, observed: tuple[Observed, ...]) -> "Problem":
+        """The same problem with other numbers seen, of the same kinds, times and shapes, which
+        shares compiled programs: for many fits of one scene.
+
+        Raises:
+            InputError: something else differs than what was seen.
+        """
+        made = replace(self, observed=observed)
+        for one in observed:
+            one.check(self.simulation, self.look, None)
+        kinds = [(type(one), tuple(np.asarray(one.times, float))) for one in self.observed]
+        shapes = jax.tree.map(jnp.shape, self.data())
+        if kinds != [(type(one), tuple(np.asarray(one.times, float))) for one in observed]:
+            raise InputError("observed: other kinds or times than the problem was made for")
+        if shapes != jax.tree.map(jnp.shape, made.data()):
+            raise InputError("observed: other shapes than the problem was made for")
+        return made
 
     def data(self) -> tuple[Any, ...]:
         """What the residuals are computed from: a pytree of arrays."""
@@ -123,7 +143,8 @@ class Problem:
             InputError: the numbers give no bound to the time step.
         """
         simulation, look = self.changed(self.cast(vector))
-        steps = steps_for(simulation, float(np.max(np.diff([0.0, *self.times]))))
+        longest = float(np.max(np.diff([0.0, *self.times])))
+        steps = self.steps or steps_for(simulation, longest)
         if before is not None and steps <= before.steps <= 4 * steps:
             return before
         if before is not None:
@@ -206,6 +227,7 @@ def problem(
     look: Look | None = None,
     end: float | None = None,
     adjoint: Adjoint = CHECKPOINTED,
+    steps: int | None = None,
 ) -> Problem:
     """A problem, its observations checked.
 
@@ -221,4 +243,6 @@ def problem(
     times = sorted({float(t) for one in observed for t in np.asarray(one.times, np.float64)})
     if times[-1] == 0:
         raise InputError("observed: all of it is at time 0, before anything has moved")
-    return Problem(simulation, look, layout, observed, tuple(times), adjoint)
+    if steps is not None and not 1 <= steps <= MOST_STEPS:
+        raise InputError(f"steps: is {steps}; give 1 to {MOST_STEPS} between two of the times")
+    return Problem(simulation, look, layout, observed, tuple(times), adjoint, steps)

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 from jaxphys.fitting.evaluation import Evaluator
 
 DONE, FLAT, FAILED = "converged", "nothing left to gain", "the simulation fails at the start"
+NO_SLOPE = "stopped where derivatives are not finite"
 
 
 class Step(NamedTuple):
@@ -29,15 +30,38 @@ class Step(NamedTuple):
     reason: str = ""
 
 
+def within(H: np.ndarray, g: np.ndarray, radius: float) -> tuple[np.ndarray, bool]:
+    """(step, whether the radius holds it back): what lowers g . step + step . H step / 2 most of
+    all steps that are no longer than `radius` (Nocedal and Wright 2006, section 4.3).
+
+    Directions of which H knows nothing are held to a hundred.
+    """
+    values, directions = np.linalg.eigh(0.5 * (H + H.T))
+    values = np.maximum(values, 1e-7 * max(values.max(), 0.0)) + 1e-4
+    along = directions.T @ g
+
+    def length(damping: float) -> float:
+        return float(np.linalg.norm(along / (values + damping)))
+
+    low, high = 0.0, float(np.linalg.norm(g)) / radius
+    held = length(low) > radius
+    for _ in range(60 if held else 0):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if length(middle) > radius else (low, middle)
+    return -directions @ (along / (values + (high if held else 0.0))), held
+
+
 @dataclass(frozen=True)
 class GaussNewton:
-    """Levenberg-Marquardt: a column of derivatives for each free number, by forward mode.
+    """Gauss-Newton's steps within a radius that is trusted (Levenberg and Marquardt's method;
+    Nocedal and Wright 2006, algorithm 4.1): a column of derivatives for each free number, by
+    forward mode.
 
-    For up to some ten numbers, and residuals. Marquardt's damping in units of `Free.scale`, so that
-    no step is longer than what is much (Nocedal and Wright 2006, chapter 10).
+    For up to some ten numbers, and residuals. Lengths are in units of `Free.scale`: far from the
+    end the numbers that matter most move first, and those that matter little hardly.
 
     Attributes:
-        iterations: at most.
+        iterations: at most, of each stage.
         tolerance: converged when a step changes no number by more than this share of what is much.
         longest: step, in units of what is much.
     """
@@ -56,35 +80,45 @@ class GaussNewton:
             free: which numbers may change, bool (P,).
             frames: so many of the times are compared.
         """
-        damping = 1e-3
+        radius, farthest = self.longest, ask.problem.layout.farthest()
         for _ in range(self.iterations):
             ask.match(vector)
             loss, slope, gram = ask.normal(vector, frames)
             if not np.isfinite(loss):
                 yield Step(vector, loss, FAILED)
                 return
-            scale = ask.problem.layout.scale(vector)[free]
-            g = slope[free] * scale
-            H = gram[np.ix_(free, free)] * np.outer(scale, scale)
-            diagonal = np.diag(H) + 1e-12 * max(np.trace(H), 1e-300)
+            if not (np.all(np.isfinite(slope)) and np.all(np.isfinite(gram))):
+                yield Step(vector, loss, NO_SLOPE)
+                return
+            # What stands at its end and would go beyond it waits.
+            member = free & ~((np.abs(vector) >= farthest) & (vector * slope < 0))
+            if not member.any():
+                yield Step(vector, loss, DONE)
+                return
+            scale = ask.problem.layout.scale(vector)[member]
+            g = slope[member] * scale
+            H = gram[np.ix_(member, member)] * np.outer(scale, scale)
             while True:
-                step = -np.linalg.solve(H + damping * np.diag(diagonal), g)
-                step *= min(1.0, self.longest / max(np.max(np.abs(step)), 1e-300))
+                step, held = within(H, g, radius)
                 trial = vector.copy()
-                trial[free] += step * scale
+                trial[member] += step * scale
+                trial = np.clip(trial, -farthest, farthest)
                 new = ask.loss(trial, frames)
                 small = bool(np.max(np.abs(step)) < self.tolerance)
                 if new <= loss:
                     break
-                damping *= 8
-                if small or damping > 1e12:
-                    yield Step(vector, loss, DONE if small else FLAT)
+                radius = 0.25 * float(np.linalg.norm(step))
+                if small:
+                    yield Step(vector, loss, FLAT if held else DONE)
                     return
             predicted = -(g @ step + 0.5 * step @ H @ step)
             gained = (loss - new) / max(predicted, 1e-300)
-            damping = max(damping * (0.2 if gained > 0.5 else 1 if gained > 0.1 else 3), 1e-9)
+            if gained < 0.25:
+                radius = 0.5 * float(np.linalg.norm(step))
+            elif gained > 0.75 and held:
+                radius = min(2 * radius, self.longest)
             vector = trial
-            yield Step(vector, new, DONE if small else "")
+            yield Step(vector, new, (FLAT if held else DONE) if small else "")
             if small:
                 return
 
@@ -125,12 +159,16 @@ class LBFGS:
             loss = min(loss, 1e6 * size)
             return loss / size, slope * scale / size
 
+        farthest = ask.problem.layout.farthest()
+        unit = np.where(scale > 0, scale, 1.0)
+        low, high = (-farthest - vector) / unit, (farthest - vector) / unit
         steps: list[Step] = []
         found = minimize(
             function,
             np.zeros(len(vector)),
             jac=True,
             method="L-BFGS-B",
+            bounds=list(zip(low, high, strict=True)),
             callback=lambda _: steps.append(Step(best["vector"], best["loss"])),
             options={
                 "maxiter": self.iterations,
@@ -166,13 +204,13 @@ class Adam:
         scale = ask.problem.layout.scale(vector) * free
         place = np.zeros(len(vector), np.float32)
         state = optimiser.init(place)
-        failures = 0
+        failures, farthest = 0, ask.problem.layout.farthest()
         for iteration in range(self.iterations):
-            here = vector + np.asarray(place, np.float64) * scale
+            here = np.clip(vector + np.asarray(place, np.float64) * scale, -farthest, farthest)
             if iteration % self.match_every == 0:
                 ask.match(here)
             loss, slope = ask.gradient(here, frames)
-            if not np.isfinite(loss):
+            if not (np.isfinite(loss) and np.all(np.isfinite(slope))):
                 failures += 1
                 if failures > 3 or iteration == 0:
                     yield Step(here, loss, FAILED if iteration == 0 else "the simulation fails")

@@ -23,6 +23,7 @@ from jaxphys.fitting import (
     fit,
     layout,
     problem,
+    solved,
 )
 from jaxphys.fitting.motion import motion_at, steps_for
 from jaxphys.fitting.problem import Program
@@ -228,3 +229,62 @@ def test_a_field_and_groups_reach_their_particles(simulation):
     (rough,) = numbers.roughness(jnp.asarray(vector))
     # Four pairs along x differ by log10 4 decades, over the 0.3 that are expected.
     assert float(jnp.sum(rough**2)) == pytest.approx(4 * (np.log10(4) / 0.3) ** 2)
+
+
+def test_a_number_whose_best_is_beyond_its_bound_ends_beside_it(simulation, truth):
+    """The truth is 0.25 and at most 0.2 is allowed: the fit ends there, finite and converged."""
+    free = {"poisson_ratio": Bounded(0.1, 0.0, 0.2), "youngs_modulus": Log(2000.0)}
+    moved = simulation.with_(velocity=TRUTH["velocity"])
+    found = fit(moved, free, Tracks(truth, np.array(TIMES), noise=1e-3))
+    assert found.values["poisson_ratio"] == pytest.approx(0.2, abs=1e-3)
+    assert found.reason in ("converged", "nothing left to gain")
+    assert np.all(np.isfinite(found.vector))
+
+
+def test_a_start_that_is_too_stiff_for_the_step_gets_more_steps_or_one_line(simulation, truth):
+    """A hundred times stiffer takes ten times the steps; what would take millions is refused."""
+    tracks = Tracks(truth, np.array(TIMES), noise=1e-3)
+    soft, stiff = (
+        problem(s, layout({"youngs_modulus": Log(E)}, s, None), (tracks,))
+        for s, E in ((simulation, 1e7), (simulation, 1e9))
+    )
+    fewer, more = (p.program(p.layout.start()).steps for p in (soft, stiff))
+    assert 7 * fewer < more < 15 * fewer  # the ladder has two rungs to a doubling
+    for stiffness, told in ((1e14, "of them between two times"), (1e16, "steps a frame")):
+        with pytest.raises(InputError, match=told) as caught:
+            fit(simulation, {"youngs_modulus": Log(stiffness)}, tracks)
+        assert "\n" not in str(caught.value)
+
+
+def test_steps_that_are_asked_for_are_taken(simulation, truth):
+    tracks = Tracks(truth, np.array(TIMES), noise=1e-3)
+    asked = problem(simulation, layout(FREE, simulation, None), (tracks,), steps=37)
+    assert asked.program(asked.layout.start()).steps == 37
+    with pytest.raises(InputError, match="steps: is 0"):
+        problem(simulation, layout(FREE, simulation, None), (tracks,), steps=0)
+
+
+def test_a_fit_that_diverges_keeps_the_best_and_says_why(simulation, truth):
+    """A rate that throws the block out of the domain: its start was better than all after it."""
+    free = {"velocity": Free((0.0, 0.0, 0.0), size=300.0)}
+    tracks = Tracks(truth, np.array(TIMES), noise=1e-3)
+    moved = simulation.with_(youngs_modulus=TRUTH["youngs_modulus"], poisson_ratio=0.25)
+    found = fit(moved, free, tracks, search=Adam(iterations=30, rate=1.0), steps=20)
+    losses = [row["loss"] for row in found.history if row["loss"] is not None]
+    assert found.reason == "the simulation fails"
+    assert found.loss == pytest.approx(min(losses), rel=1e-6)
+
+
+def test_problems_that_see_other_numbers_share_their_programs(simulation, truth):
+    tracks = Tracks(truth, np.array(TIMES), noise=1e-3)
+    asked = problem(simulation, layout(FREE, simulation, None), (tracks,), steps=20)
+    noisy = truth + 1e-3 * np.random.default_rng(7).normal(size=truth.shape)
+    other = asked.observing((Tracks(noisy, np.array(TIMES), noise=1e-3),))
+    solved(asked)
+    programs = dict(other._compiled)
+    shared = solved(other)
+    assert other._compiled == programs
+    alone = fit(simulation, FREE, Tracks(noisy, np.array(TIMES), noise=1e-3), steps=20)
+    np.testing.assert_array_equal(shared.vector, alone.vector)
+    with pytest.raises(InputError, match="other shapes"):
+        asked.observing((Tracks(truth[:, :5], np.array(TIMES), np.arange(5)),))

@@ -1,5 +1,7 @@
 """Observations: residuals by hand, what is refused, and files there and back."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -106,6 +108,9 @@ def test_hidden_parts_are_trimmed(simulation, places):
 
 
 CAMERA = look_at((1.5, 0.4, 0.4), (0.4, 0.4, 0.4), width=8, height=6)
+HOLED = np.array([0.0, np.nan, 0.0])
+WIDER = look_at((1.5, 0.4, 0.4), (0.4, 0.4, 0.4), width=9, height=6)
+BLIND = replace(CAMERA, focal=CAMERA.focal * jnp.nan)
 
 
 @pytest.mark.parametrize(
@@ -122,6 +127,21 @@ CAMERA = look_at((1.5, 0.4, 0.4), (0.4, 0.4, 0.4), width=8, height=6)
         (lambda p: Tracks(p, [0.0, 0.01, 0.5]), "frame 2 is at 0.5 s, after the run ends"),
         (lambda p: Tracks(p, TIMES, noise=0.0), "tracks.noise"),
         (lambda p: Tracks(p[:, :1], TIMES, np.array([99])), "99 is none of the 12"),
+        (lambda p: Tracks(p, TIMES[:2]), r"tracks.positions: has shape .* expected \(2, 12, 3\)"),
+        (
+            lambda p: Tracks(p, TIMES, seen=np.ones((3, 4), bool)),
+            r"tracks.seen: has shape \(3, 4\)",
+        ),
+        (lambda p: Tracks(p, [0.0, np.nan, 0.02]), "tracks.times: frame 1 is not finite"),
+        (
+            lambda p: Points([p[0], p[1] * np.nan, p[2]], TIMES),
+            "points.clouds: frame 1 has entries",
+        ),
+        (lambda p: Points([p[0], p[1], p[2] - 9], TIMES), "frame 2, point 0 .* outside"),
+        (
+            lambda p: Points(list(p), TIMES, np.array([-1])),
+            "points.particles: -1 is none of the 12",
+        ),
         (lambda p: Points([p[0], p[1]], TIMES), "points.clouds: 2 of them for 3"),
         (lambda p: Points([p[0], p[1], p[2, :0]], TIMES), "frame 2 has shape"),
         (lambda p: Images(np.zeros((3, 6, 8, 3)), CAMERA, TIMES), "needs look="),
@@ -139,6 +159,19 @@ def test_what_does_not_fit_is_named_by_frame_and_field(make, told, simulation, p
         (lambda: Masks(np.zeros((3, 7, 8)), CAMERA, TIMES), r"expected \(1, 3, 6, 8\)"),
         (lambda: Masks(np.full((3, 6, 8), 2.0), CAMERA, TIMES), r"frame 0 has values outside"),
         (lambda: Images(np.zeros((2, 3, 6, 8, 3)), [CAMERA], TIMES), "images.frames: has shape"),
+        (lambda: Images(np.zeros((2, 6, 8, 3)), CAMERA, TIMES), "images.frames: has shape"),
+        (
+            lambda: Images(np.ones((3, 6, 8, 3)) * HOLED[:, None, None, None], CAMERA, TIMES),
+            r"images.frames\[0\]: frame 1 has entries that are not finite",
+        ),
+        (
+            lambda: Masks(np.zeros((2, 3, 6, 8)), [CAMERA, WIDER], TIMES),
+            r"masks.cameras: have several sizes, \[\(6, 8\), \(6, 9\)\]",
+        ),
+        (
+            lambda: Masks(np.zeros((2, 3, 6, 8)), [CAMERA, BLIND], TIMES),
+            r"masks.cameras: number 1 has entries that are not finite",
+        ),
     ],
 )
 def test_pictures_of_another_size_are_refused(make, told, simulation):

@@ -127,6 +127,15 @@ def refuse_not_finite(observed: Observed, field: str, array: np.ndarray) -> None
         raise observed.fail(field, f"frame {_first(wrong)} has entries that are not finite")
 
 
+def refuse_unknown(observed: Observed, particles: np.ndarray, count: int) -> None:
+    """Raises `InputError` where `particles` are no (M,) whole numbers below `count`."""
+    if particles.ndim != 1 or particles.dtype.kind not in "iu":
+        raise observed.fail("particles", "give (M,) whole numbers")
+    wrong = (particles < 0) | (particles >= count)
+    if wrong.any():
+        raise observed.fail("particles", f"{particles[wrong][0]} is none of the {count}")
+
+
 def refuse_outside(observed: Observed, field: str, frame: int, points, simulation) -> None:
     """Raises `InputError` where points (M, 3) [m] of a frame lie outside of the domain."""
     extent = np.array(simulation.config.grid.extent)

@@ -43,6 +43,10 @@ class Seen(Observed):
     def check_own(self, simulation, look):
         if look is None:
             raise self.fail("frames", "needs look=, what is drawn; `build` gives it")
+        for number, camera in enumerate(self.views):
+            numbers = (camera.rotation, camera.translation, camera.focal, camera.centre)
+            if not all(np.all(np.isfinite(part)) for part in numbers):
+                raise self.fail("cameras", f"number {number} has entries that are not finite")
         sizes = {(camera.height, camera.width) for camera in self.views}
         if len(sizes) != 1:
             raise self.fail("cameras", f"have several sizes, {sorted(sizes)}; give one observation "
@@ -52,11 +56,11 @@ class Seen(Observed):
         if pictures.shape != wanted:
             raise self.fail("frames", f"has shape {pictures.shape}, expected {wanted} (cameras, "
                             "times, height, width)")  # fmt: skip
-        for camera, frames in enumerate(pictures):
-            refuse_not_finite(self, f"frames[{camera}]", frames)
+        for number, frames in enumerate(pictures):
+            refuse_not_finite(self, f"frames[{number}]", frames)
             if frames.min() < 0 or frames.max() > 1:
                 wrong = np.argmax((frames.min(axis=(1, 2)) < 0) | (frames.max(axis=(1, 2)) > 1))
-                raise self.fail(f"frames[{camera}]", f"frame {wrong} has values outside of [0, 1]")
+                raise self.fail(f"frames[{number}]", f"frame {wrong} has values outside of [0, 1]")
 
     def noise_of(self, simulation):
         return self.noise or self.expected

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from jaxphys.core.errors import InputError
-from jaxphys.fitting.observed.base import Observed, refuse_outside, size_of
+from jaxphys.fitting.observed.base import Observed, refuse_outside, refuse_unknown, size_of
 
 SHARE = 5e-3  # of the object's size: the noise that is expected where none is given
 APART = 0.5  # of the object's size: clouds further apart than that are first brought together
@@ -56,8 +56,8 @@ class Points(Observed):
                 raise self.fail("clouds", f"frame {frame} has entries that are not finite")
             refuse_outside(self, "clouds", frame, cloud, simulation)
         count = simulation.config.particles
-        if self.particles is not None and np.any(np.asarray(self.particles) >= count):
-            raise self.fail("particles", f"there are {count}")
+        if self.particles is not None:
+            refuse_unknown(self, np.asarray(self.particles), count)
         if not len(self._which(simulation)):
             raise InputError("points.particles: nothing is drawn; name the particles")
 

@@ -10,6 +10,7 @@ from jaxphys.fitting.observed.base import (
     Observed,
     refuse_not_finite,
     refuse_outside,
+    refuse_unknown,
     size_of,
 )
 from jaxphys.mpm.loop.sorting import cell_order
@@ -42,11 +43,7 @@ class Tracks(Observed):
         count = simulation.config.particles
         if self.particles is not None:
             particles = np.asarray(self.particles)
-            if particles.ndim != 1 or particles.dtype.kind not in "iu":
-                raise self.fail("particles", "give (M,) whole numbers")
-            wrong = (particles < 0) | (particles >= count)
-            if wrong.any():
-                raise self.fail("particles", f"{particles[wrong][0]} is none of the {count}")
+            refuse_unknown(self, particles, count)
             count = len(particles)
         wanted = (len(self.times), count, 3)
         if positions.shape != wanted:
