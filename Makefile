@@ -33,7 +33,7 @@ lint: $(VENV)/installed-test
 
 docs: $(VENV)/installed
 	$(PIP) install --constraint constraints.txt --editable '.[docs,mesh]'
-	$(BIN)/python -m sphinx --fail-on-warning --keep-going -b html docs outputs/docs
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going $(DOCS) -b html docs outputs/docs
 
 bench: $(VENV)/installed-test
 	$(PIP) install --constraint constraints.txt --editable '.[bench]'

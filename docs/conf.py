@@ -34,7 +34,7 @@ nb_merge_streams = True
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
-suppress_warnings = ["myst.header", "misc.highlighting_failure", "ref.python"]
+suppress_warnings = ["myst.header", "misc.highlighting_failure", "ref.python", "myst-nb.lexer"]
 
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
