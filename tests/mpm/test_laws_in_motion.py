@@ -12,7 +12,6 @@ from jaxphys.mpm.boundaries import Plane, Setting, prepare
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.loop.rollout import rollout
 from jaxphys.mpm.loop.status import SimulationError, check
-from jaxphys.mpm.materials.catalogue import MATERIALS
 from jaxphys.mpm.materials.elasticity import FIXED_COROTATED, HENCKY, NEO_HOOKEAN
 from jaxphys.mpm.materials.fibres import FIBRES
 from jaxphys.mpm.materials.mean_volume import at_mean_volume
@@ -20,7 +19,7 @@ from jaxphys.mpm.materials.viscoelasticity import STANDARD_SOLID
 from jaxphys.mpm.state import OK, UNSTABLE_STEP, Config, Model, initial_state
 from jaxphys.mpm.stepping.bounds import largest_stable_dt, with_wave_modulus
 
-from .materials.test_laws import NAMES, NUMBERS
+from .materials.test_laws import LAWS, NAMES, NUMBERS
 
 EACH = 6
 DT = 2e-3
@@ -29,7 +28,7 @@ DT = 2e-3
 def several():
     """Seven laws side by side, strained into yielding, above a floor: (config, model, state)."""
     random = np.random.default_rng(5)
-    laws = [MATERIALS[name].law for name in NAMES]
+    laws = [LAWS[name] for name in NAMES]
     count = EACH * len(laws)
     segments = tuple((law, EACH * i, EACH * (i + 1)) for i, law in enumerate(laws))
     config = Config(Grid((8, 8, 8), 0.1), segments)
