@@ -15,7 +15,7 @@ from functools import partial
 
 from benchmarks.case import Case, Prepared
 from benchmarks.work_precision_more import gradient_cases, picture_cases
-from benchmarks.work_precision_peers import left_out
+from benchmarks.work_precision_peers import facts, left_out
 from benchmarks.work_precision_peers import methods as peer_methods
 
 # Grids of each problem, coarsest first; those that are quick come with --quick.
@@ -159,16 +159,13 @@ def prepare(name: str, resolution: int, changes: dict) -> Prepared:
         work=float(problem.count * problem.steps),
         compile_seconds=compile_seconds,
         error=lambda: known.norm(problem, end),
-        extra={
-            "problem": name,
-            "resolution": resolution,
-            "counts": known.resolution,
-            "expected_order": known.order,
-            "floor": known.floor,
-            "particles": problem.count,
-            "steps": int(end.status.taken) - int(problem.state.status.taken),
-            "code": int(end.status.code),
-        },
+        extra=facts(
+            known,
+            resolution,
+            problem.count,
+            int(end.status.taken) - int(problem.state.status.taken),
+            int(end.status.code),
+        ),
     )
 
 
@@ -208,16 +205,7 @@ def prepare_peer(name: str, resolution: int) -> Prepared:
         lambda: advance(problem.steps),
         work=float(problem.count * problem.steps),
         error=lambda: error,
-        extra={
-            "problem": name,
-            "resolution": resolution,
-            "counts": known.resolution,
-            "expected_order": known.order,
-            "floor": known.floor,
-            "particles": problem.count,
-            "steps": problem.steps,
-            "code": 0,
-        },
+        extra=facts(known, resolution, problem.count, problem.steps),
     )
 
 

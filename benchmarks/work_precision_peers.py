@@ -50,6 +50,20 @@ def built(name: str, resolution: int, peer: Peer):
     return PROBLEMS[name].build(resolution, "float32")
 
 
+def facts(known, resolution: int, particles: int, steps: int, code: int = 0) -> dict:
+    """What every line tells of a problem of the catalogue on a grid."""
+    return {
+        "problem": known.name,
+        "resolution": resolution,
+        "counts": known.resolution,
+        "expected_order": known.order,
+        "floor": known.floor,
+        "particles": particles,
+        "steps": steps,
+        "code": code,
+    }
+
+
 def prepare(name: str, resolution: int, peer: Peer, stretch: float = 1.0) -> Prepared:
     """A peer on a problem; what is timed is its run from start to end."""
     import jax
@@ -84,15 +98,8 @@ def prepare(name: str, resolution: int, peer: Peer, stretch: float = 1.0) -> Pre
         compile_seconds=session.ready["seconds"] + first["seconds"] - second["seconds"],
         error=error,
         once=second["seconds"] > PATIENCE,
-        extra={
-            "problem": name,
-            "resolution": resolution,
-            "counts": known.resolution,
-            "expected_order": known.order,
-            "floor": known.floor,
-            "particles": problem.count,
-            "steps": steps,
-            "code": 0,
+        extra=facts(known, resolution, problem.count, steps)
+        | {
             "law": session.ready["law"],
             "peer_versions": session.ready["versions"],
             "peak_bytes": second["peak_bytes"],  # of its process

@@ -4,7 +4,6 @@ import dataclasses
 import json
 import os
 import sys
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,6 @@ import numpy as np
 from jaxphys.core.checkpoints import Checkpoints, by_name, fingerprint, from_names
 from jaxphys.core.errors import InputError
 from jaxphys.core.files import read_json, write_json
-from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.core.run_folder import RunFolder, run_folder
 from jaxphys.core.seals import is_sound, seal
 from jaxphys.gaussians.gaussians import Gaussians, from_points
@@ -22,8 +20,8 @@ from jaxphys.gaussians.ply import read_ply, write_ply
 from jaxphys.guidance.prompts.refine import Refinement, check_prompt, refine
 from jaxphys.pipeline.animate import Watch, animate_in, products
 from jaxphys.pipeline.output import Timing
-from jaxphys.pipeline.record import SAVE_EVERY
 from jaxphys.pipeline.resume import FOLDER
+from jaxphys.pipeline.saving import saving
 from jaxphys.scene.build import validate
 from jaxphys.scene.json import to_json
 from jaxphys.scene.scene import Generation, Scene
@@ -174,17 +172,10 @@ def _optimise(
     if newest is not None:
         cloud = from_points(np.zeros((config.count, 3), np.float32), np.zeros(3), 1.0)
         resume = from_names(optimise.start(cloud, config), newest[1])
-    saved = time.monotonic()
-    with deferred_interrupt() as interrupted:
+    with saving() as after:
 
         def on_step(state) -> None:
-            nonlocal saved
-            stop = interrupted()
-            if stop or time.monotonic() - saved > SAVE_EVERY:
-                checkpoints.save(int(state.step), by_name(state))
-                saved = time.monotonic()
-            if stop:
-                raise KeyboardInterrupt
+            after(lambda: checkpoints.save(int(state.step), by_name(state)), None)
 
         return optimise.text_to_gaussians(
             prompt,

@@ -1,7 +1,6 @@
 """A folder of photographs with known cameras in, Gaussians out."""
 
 import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,10 @@ from tqdm import tqdm
 from jaxphys.core.checkpoints import Checkpoints, by_name, fingerprint, from_names
 from jaxphys.core.fields import SEED, between, check_number
 from jaxphys.core.files import write_json
-from jaxphys.core.interrupt import deferred_interrupt
 from jaxphys.core.run_folder import run_folder
 from jaxphys.gaussians.ply import write_ply
 from jaxphys.pipeline.output import Timing
-from jaxphys.pipeline.record import SAVE_EVERY
+from jaxphys.pipeline.saving import saving
 from jaxphys.pipeline.video import write_picture
 from jaxphys.reconstruction import optimise as optimising
 from jaxphys.reconstruction.capture import read_capture, read_picture, turned, upright
@@ -137,7 +135,6 @@ def reconstruct(
 def _steps(
     state: ReconstructState, among, config, size, seed, checkpoints, progress, watch
 ) -> ReconstructState:
-    saved = time.monotonic()
     bar = tqdm(
         total=config.steps,
         initial=int(state.step),
@@ -145,21 +142,14 @@ def _steps(
         disable=not progress,
         leave=False,
     )
-    with deferred_interrupt() as interrupted, bar:
+    with saving() as after, bar:
 
         def on_step(state: ReconstructState) -> None:
-            nonlocal saved
-            stop = interrupted()
-            try:
-                if watch is not None:
-                    watch(int(state.step))
-            except KeyboardInterrupt:
-                stop = True
-            if stop or time.monotonic() - saved > SAVE_EVERY:
-                checkpoints.save(int(state.step), by_name(state))
-                saved = time.monotonic()
-            if stop:
-                raise KeyboardInterrupt
+            step = int(state.step)
+            after(
+                lambda: checkpoints.save(step, by_name(state)),
+                None if watch is None else lambda: watch(step),
+            )
             bar.update()
 
         return optimising.optimise(state, among, config, size=size, seed=seed, on_step=on_step)

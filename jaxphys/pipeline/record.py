@@ -12,8 +12,7 @@ from jaxphys.mpm.state import State
 from jaxphys.pipeline.frames import Moment, frames
 from jaxphys.pipeline.output import Timing
 from jaxphys.pipeline.resume import MotionCheckpoint
-
-SAVE_EVERY = 20.0  # seconds of work that an interruption without warning may cost
+from jaxphys.pipeline.saving import SAVE_EVERY
 
 
 @dataclass

@@ -13,6 +13,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.guidance.prompts.refine import Refinement
 from jaxphys.pipeline import generate as generate_module
+from jaxphys.pipeline import saving
 from jaxphys.pipeline.generate import generate
 from jaxphys.scene import Domain, Object, Scene, read_scene
 
@@ -186,7 +187,7 @@ def test_an_optimisation_goes_on_where_it_was_interrupted(calls, tmp_path, monke
         return from_points(np.full((40, 3), seen[-1], np.float32), np.full(3, 0.5), 0.3)
 
     monkeypatch.setattr(optimise, "text_to_gaussians", made)
-    monkeypatch.setattr(generate_module, "SAVE_EVERY", -1.0)  # after each step
+    monkeypatch.setattr(saving, "SAVE_EVERY", -1.0)  # after each step
     options = {"steps": 6, "splats": 40}
     with pytest.raises(KeyboardInterrupt):
         generate("a can", SCENE, tmp_path, **options)
