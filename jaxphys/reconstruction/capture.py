@@ -82,6 +82,8 @@ def read_capture(folder: Path) -> Capture:
         )
     if len(capture.shots) < 2:
         raise InputError(f"{folder}: has {len(capture.shots)} pictures with a camera; give two")
+    if all(shot.held_out for shot in capture.shots):
+        raise InputError(f"{folder}: holds pictures for judging alone (transforms_test.json)")
     return capture
 
 
@@ -92,23 +94,31 @@ def read_picture(shot: Shot, longest: int) -> np.ndarray:
     Raises:
         InputError: it cannot be read, or has another shape than its camera.
     """
-    with reading(shot.path), Image.open(shot.path) as picture:
-        width, height = picture.size
-        if max(width, height) > LONGEST:
-            raise InputError(f"{shot.path}: {width} x {height} pixels; give at most {LONGEST}")
-        wanted = shot.size[0] / shot.size[1]
-        if abs(width / height / wanted - 1) > 0.02:
-            raise InputError(
-                f"{shot.path}: is {width} x {height}, and its camera {shot.size[0]} x"
-                f" {shot.size[1]}; give the pictures that the cameras are of"
-            )
-        scale = min(1.0, longest / max(width, height))
-        if scale == 1:
-            return np.asarray(picture.convert("RGBA"))
-        size = max(1, round(width * scale)), max(1, round(height * scale))
-        # Colours of what is transparent must not run into what is not.
-        whole = picture.convert("RGBA").convert("RGBa")
-        return np.asarray(whole.resize(size, Image.Resampling.BOX).convert("RGBA"))
+    with reading(shot.path):
+        try:
+            with Image.open(shot.path) as picture:
+                return _brought_to(picture, shot, longest)
+        except (SyntaxError, Image.DecompressionBombError) as error:  # as Pillow calls them
+            raise InputError(f"is no picture that can be read ({error})") from None
+
+
+def _brought_to(picture: Image.Image, shot: Shot, longest: int) -> np.ndarray:
+    width, height = picture.size
+    if max(width, height) > LONGEST:
+        raise InputError(f"{shot.path}: {width} x {height} pixels; give at most {LONGEST}")
+    wanted = shot.size[0] / shot.size[1]
+    if abs(width / height / wanted - 1) > 0.02:
+        raise InputError(
+            f"{shot.path}: is {width} x {height}, and its camera {shot.size[0]} x"
+            f" {shot.size[1]}; give the pictures that the cameras are of"
+        )
+    scale = min(1.0, longest / max(width, height))
+    if scale == 1:
+        return np.asarray(picture.convert("RGBA"))
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    # Colours of what is transparent must not run into what is not.
+    whole = picture.convert("RGBA").convert("RGBa")
+    return np.asarray(whole.resize(size, Image.Resampling.BOX).convert("RGBA"))
 
 
 def turned(capture: Capture, turn: np.ndarray) -> Capture:

@@ -1,5 +1,6 @@
 """Captures of known Gaussians through readers, optimisation and command, to held-out pictures."""
 
+import dataclasses
 import json
 import shutil
 from pathlib import Path
@@ -262,3 +263,27 @@ def test_what_is_no_capture(tmp_path):
     (model / "images.bin").write_bytes(b"")
     with pytest.raises(InputError, match=r"cameras\.bin.*cut off"):
         read_capture(tmp_path)
+
+
+def test_pictures_that_cannot_be_used(synthetic, tmp_path):
+    folder = tmp_path / "capture"
+    shutil.copytree(synthetic, folder)
+    (folder / "transforms_train.json").unlink()
+    with pytest.raises(InputError, match="for judging alone"):
+        read_capture(folder)
+    shot = read_capture(synthetic).shots[0]
+    whole = shot.path.read_bytes()
+    for name, content, words in (
+        ("cut.png", whole[: len(whole) // 2], "cut"),
+        ("text.png", b"no picture", "cannot"),
+        ("broken.png", whole[:20] + b"\0\0\0\0" + whole[24:], "broken"),
+        ("wide.png", None, "is 90 x 48"),
+    ):
+        path = tmp_path / name
+        if content is None:
+            Image.new("RGB", (90, SIDE)).save(path)
+        else:
+            path.write_bytes(content)
+        with pytest.raises(InputError, match=words) as caught:
+            read_picture(dataclasses.replace(shot, path=path), 400)
+        assert str(path) in str(caught.value)
