@@ -58,7 +58,7 @@ def generate(
         seed: Of every random choice. Default: 0.
         width: Of the video [pixels]. Default: 1958.
         height: Of the video [pixels]. Default: 1090.
-        frames: Number of pictures. Default: 48.
+        frames: Number of pictures. Default: the scene's, mostly 48.
         steps: Steps of optimisation.
         splats: Number of Gaussians at most.
         stepping: Time steps that adapt to what the motion allows, equal ones, or implicit ones for
@@ -210,7 +210,7 @@ def animate(
         seed: Of every random choice. Default: 0.
         width: Of the video [pixels]. Default: 1958.
         height: Of the video [pixels]. Default: 1090.
-        frames: Number of pictures. Default: 48.
+        frames: Number of pictures. Default: the scene's, mostly 48.
         splats: Number of Gaussians that a mesh becomes. Default: 20000.
         stepping: Time steps that adapt to what the motion allows, equal ones, or implicit ones for
             stiff matter in slow motion (`jaxphys plan` says what pays). Default: adaptive.
