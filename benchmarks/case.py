@@ -17,6 +17,7 @@ class Prepared:
             reference.
         once: time the first call and no other: for whole runs, in which compiling counts.
         extra: anything else worth a field of the line.
+        found: evaluated once after the timings, more fields that only a run can tell.
     """
 
     call: Callable[[], object]
@@ -25,6 +26,7 @@ class Prepared:
     error: Callable[[], float] | None = None
     once: bool = False
     extra: Mapping[str, object] = field(default_factory=dict)
+    found: Callable[[], Mapping[str, object]] = dict
 
 
 @dataclass(frozen=True)

@@ -60,15 +60,19 @@ def prepare(frames: int, width: int, height: int, splats: int) -> Prepared:
     thing = gaussians_from_mesh(fruit(), splats, 0)
     folder = tempfile.TemporaryDirectory()
     out = Path(folder.name) / "run"
-    extra: dict[str, object] = {"frames": frames}
 
-    def call() -> None:
-        animate(scene, out, objects=(thing,))
+    def found() -> dict[str, object]:
         timing = json.loads((out / "timing.json").read_text())
-        extra.update(stages=timing["stages"], compile=timing["compile"])
-        extra["particles"] = build(scene, thing).simulation.config.particles
+        particles = build(scene, thing).simulation.config.particles
+        return {"stages": timing["stages"], "compile": timing["compile"], "particles": particles}
 
-    return Prepared(call, work=frames, once=True, extra=extra)
+    return Prepared(
+        lambda: animate(scene, out, objects=(thing,)),
+        work=frames,
+        once=True,
+        extra={"frames": frames},
+        found=found,
+    )
 
 
 def cases(quick: bool) -> list[Case]:

@@ -96,6 +96,7 @@ def measure(suite: str, name: str, method: str, quick: bool) -> dict:
         "machine": machine(),
         "commit": commit(),
         **prepared.extra,
+        **prepared.found(),
     }
 
 

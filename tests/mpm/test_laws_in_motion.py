@@ -25,10 +25,10 @@ EACH = 6
 DT = 2e-3
 
 
-def several():
-    """Seven laws side by side, strained into yielding, above a floor: (config, model, state)."""
+def several(names=NAMES):
+    """Laws side by side, strained into yielding, above a floor: (config, model, state)."""
     random = np.random.default_rng(5)
-    laws = [LAWS[name] for name in NAMES]
+    laws = [LAWS[name] for name in names]
     count = EACH * len(laws)
     segments = tuple((law, EACH * i, EACH * (i + 1)) for i, law in enumerate(laws))
     config = Config(Grid((8, 8, 8), 0.1), segments)
@@ -65,9 +65,17 @@ STRESSES += ("cohesion", "relaxing_modulus", "fibre_stiffness", "consistency")
 UNITS = dict.fromkeys(STRESSES, 1e3) | {"viscosity": 50.0, "plastic_viscosity": 100.0}
 
 
-def test_gradients_through_steps_against_central_differences():
+# Each compiles for half a minute; every law's gradient is in docs/gradients.jsonl too.
+QUICK = ("plasticine", "snow", "memory-foam")
+
+
+@pytest.mark.parametrize(
+    "law",
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NAMES],
+)
+def test_gradients_through_steps_against_central_differences(law):
     """Of every parameter of every law, through yielding, flowing, hardening and contact."""
-    config, model, state = several()
+    config, model, state = several((law,))
     config = replace(config, check_step=False)
     random = np.random.default_rng(6)
     weights = [
