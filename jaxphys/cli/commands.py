@@ -97,6 +97,7 @@ def generate(
         prompt,
         scene,
         out,
+        beside=None if config is None else config.parent,
         save_splats=save_splats,
         overwrite=overwrite,
         inputs=files_read(config),
@@ -229,10 +230,18 @@ def animate(
         overwrite: Replace the files of an earlier run of another request, and only these.
     """
     from jaxphys.cli.made import tell
-    from jaxphys.cli.scenes import as_captured, files_read, scene_for, stepping_for, with_source
+    from jaxphys.cli.scenes import (
+        as_captured,
+        files_read,
+        scene_file,
+        scene_for,
+        stepping_for,
+        with_source,
+    )
     from jaxphys.cli.settings import with_settings
     from jaxphys.pipeline.animate import animate as run
 
+    config = scene_file(config, material, source)
     changes = {"seed": seed, "width": width, "height": height, "frames": frames, "substep": substep}
     changes |= stepping_for(stepping, substep)
     scene = scene_for(config, material, changes, source)
@@ -334,7 +343,7 @@ def render(
 
 
 def plan(
-    scene: Annotated[Positional[Path | None], tyro.conf.arg(metavar="SCENE")] = None,
+    scene: Annotated[Positional[Path | None], tyro.conf.arg(metavar="SCENE|OBJECT")] = None,
     /,
     *,
     material: str | None = None,
@@ -350,21 +359,27 @@ def plan(
     For example: jaxphys plan --material sand --set domain.spacing=0.03
 
     Args:
-        scene: A scene file, ours or PhysGaussian's, or a directory of an earlier run.
-        material: Plan this material's own scene instead.
-        object: The object to plan with; without it, a ball of the same size stands in.
+        scene: A scene file, ours or PhysGaussian's; or an object or a directory, for the scene
+            that animate moves it in.
+        material: What it is made of, as for animate.
+        object: The object to plan a scene file with; without it, a ball of the same size stands in.
         settings: As for animate.
         tolerance: Plan the grid that this relative error of the motion needs, found by pilots on
             coarse grids.
         measure: Compile the programs and run each for a second, to tell the time they will take.
         json: Print JSON.
     """
-    from jaxphys.cli.scenes import scene_for, with_source
+    from jaxphys.cli.scenes import is_object, scene_file, scene_for, with_source
     from jaxphys.cli.settings import with_settings
     from jaxphys.pipeline.plan import as_text, make_plan
 
-    config = scene / "config.json" if scene is not None and scene.is_dir() else scene
-    asked = with_settings(scene_for(config, material, {}), settings)
+    config = scene
+    if scene is not None and is_object(scene):
+        if object is not None:
+            raise InputError(f"--object: {scene} is an object already; name one of them")
+        config, object = None, scene
+    config = scene_file(config, material, object)
+    asked = with_settings(scene_for(config, material, {}, object), settings)
     asked, beside = with_source(asked, object, config, None, required=False)
     made = make_plan(
         asked,

@@ -23,8 +23,22 @@ from jaxphys.scene.model_folder import (
 )
 from jaxphys.scene.read import read_scene
 from jaxphys.scene.scene import Rotation, Scene, Up
+from jaxphys.scene.source import MESHES, SPLATS
 
 LEANING = 0.85  # of what photographs call up the part along z, below which a line is said
+
+
+def scene_file(config: Path | None, material: str | None, source: Path | None) -> Path | None:
+    """The file that the scene of a command is read from, None where it is the material's own.
+
+    Without file and material, that is the config.json of a directory of `generate` or `animate`.
+    """
+    if config is not None or material is not None or source is None or not source.is_dir():
+        return config
+    kept = source / "config.json"
+    if not kept.exists() and (is_trained(source) or (source / GENERATED).exists()):
+        return None  # of photographs, with no scene yet
+    return kept
 
 
 def scene_for(
@@ -36,16 +50,17 @@ def scene_for(
 ) -> Scene:
     """The scene of a file or of a material, with the given fields changed where they are not None.
 
-    Prints the notes of an imported file on standard error. Without file and material, the
-    config.json of a directory of `generate` given as `source` counts, then jelly.
+    Prints the notes of an imported file on standard error. Without file and material it is that of
+    jelly. Another material comes with its own parameters, and steps that are asked for by name
+    replace a step that the file has.
+
+    Args:
+        config: as `scene_file` finds it.
+        source: the model that a file of PhysGaussian's is for.
 
     Raises:
         InputError: an unknown material, a bad file or a value out of range.
     """
-    if config is None and material is None and source is not None and source.is_dir():
-        config = source / "config.json"
-        if not config.exists() and (is_trained(source) or (source / GENERATED).exists()):
-            config = None  # of photographs, with no scene yet
     if base is not None:
         scene = base
     elif config is not None:
@@ -55,13 +70,15 @@ def scene_for(
         scene = loaded.scene
         for note in loaded.notes:
             print(one_line(f"note: {note}"), file=sys.stderr)
-        if material is not None:
+        if material not in (None, scene.objects[0].material):
             get_material(material)
-            first = dataclasses.replace(scene.objects[0], material=material, parameters={})
+            first = scene.objects[0].made_of(material)
             scene = dataclasses.replace(scene, objects=(first, *scene.objects[1:]))
     else:
         scene = default_scene(material or "jelly")
     given = {name: value for name, value in changes.items() if value is not None}
+    if given.get("stepping", Fixed()) != Fixed() and "substep" not in given:
+        given["substep"] = None
     try:
         return dataclasses.replace(scene, **given)
     except InputError as error:
@@ -123,6 +140,11 @@ def _turn_to_z(up: np.ndarray) -> tuple[Rotation, ...]:
         axis = np.array([1.0, 0.0, 0.0])
     x, y, z = (float(a) for a in axis / np.linalg.norm(axis))
     return (Rotation((x, y, z), angle),)
+
+
+def is_object(path: Path) -> bool:
+    """Whether a path is that of an object, or of a folder with one, and not of a scene's file."""
+    return path.is_dir() or path.suffix.lower() in (*SPLATS, *MESHES)
 
 
 def files_read(config: Path | None, source: Path | None = None) -> tuple[Path, ...]:

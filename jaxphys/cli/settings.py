@@ -54,9 +54,16 @@ def _path(scene: Scene, name: str) -> list[str]:
     first = scene.objects[0]
     if hasattr(scene, steps[0]):
         return steps
-    if name in get_material(first.material, first.law).declared:
+    parameters = get_material(first.material, first.law).declared
+    if name in parameters:
         return ["objects", "0", "parameters", name]
-    return ["objects", "0", *steps] if hasattr(first, steps[0]) else steps
+    if hasattr(first, steps[0]):
+        return ["objects", "0", *steps]
+    known = {*parameters, *to_json(first), *to_json(scene)}
+    raise InputError(
+        f"--set {name}: unknown key {steps[0]!r}, no field of the scene nor a parameter or a field "
+        f"of the first object; {nearest(steps[0], known)}"
+    )
 
 
 def _put(written: Any, name: str, path: list[str], value: Any) -> None:
@@ -79,12 +86,7 @@ def _put(written: Any, name: str, path: list[str], value: Any) -> None:
 def _key(place: Any, step: str, name: str) -> str | int:
     if isinstance(place, dict):
         if step not in place:
-            raise InputError(
-                f"--set {name}: unknown key {step!r}; {nearest(step, place)}; or a parameter or a "
-                "field of the first object"
-                if "objects" in place
-                else f"--set {name}: unknown key {step!r}; {nearest(step, place)}"
-            )
+            raise InputError(f"--set {name}: unknown key {step!r}; {nearest(step, place)}")
         return step
     if not step.isascii() or not step.isdigit() or int(step) >= len(place):
         raise InputError(f"--set {name}: {step!r} is no number below {len(place)}, of an entry")

@@ -37,7 +37,7 @@ def view(
         port: Of the server; 0: a free one.
         open: Open the browser.
     """
-    from jaxphys.cli.scenes import scene_for, with_source
+    from jaxphys.cli.scenes import is_object, scene_file, scene_for, with_source
     from jaxphys.cli.settings import with_settings
     from jaxphys.core.errors import InputError
     from jaxphys.viewer.serve import view_run, view_scene
@@ -62,8 +62,8 @@ def view(
                 )
             view_run(source, port=port, tell=tell)
         else:
-            config = source if source.suffix == ".json" else None
-            thing = None if config is not None else source
+            config, thing = (None, source) if is_object(source) else (source, None)
+            config = scene_file(config, material, thing)
             scene = with_settings(scene_for(config, material, {}, thing), settings)
             scene, beside = with_source(scene, thing, config, None)
             view_scene(scene, beside, port=port, nodes=nodes, gaussians=splats, tell=tell)

@@ -81,7 +81,8 @@ def fit(
     Args:
         scene_or_simulation: what moves. Of a scene the sources are read, and its look is drawn.
         free: what may change, by the names of `Simulation.with_`; `boundaries.0.velocity` is a
-            number of the scene's first boundary, `gaussians.harmonics` one of what is drawn.
+            number of the scene's first boundary, `boundaries.1.motion.spin` one of how the second
+            moves, `gaussians.harmonics` one of what is drawn.
         observed: what was seen, one or several.
         look: what is drawn of a simulation; `build` gives it.
         end: of the run [s], after which nothing can have been observed; None: that of a scene, and

@@ -145,8 +145,11 @@ class Layout:
             if entry.name.startswith(GAUSSIANS):
                 drawn[entry.name.removeprefix(GAUSSIANS)] = value
             elif entry.name.startswith(BOUNDARIES):
-                _, index, name = entry.name.split(".", 2)
-                boundaries.setdefault(int(index), {})[name] = value
+                index, *parts, last = boundary_path(entry.name)
+                place = boundaries.setdefault(int(index), {})
+                for part in parts:
+                    place = place.setdefault(part, {})
+                place[last] = value
             else:
                 numbers[entry.name] = value
         if boundaries:
@@ -175,6 +178,21 @@ class Layout:
                 )
                 found.append((line[first] - line[second]) / much)
         return found
+
+
+def boundary_path(name: str) -> list[str]:
+    """The place in the list and the names of `boundaries.0.motion.velocity`.
+
+    Raises:
+        InputError: it is no such name.
+    """
+    path = name.split(".")[1:]
+    if len(path) < 2 or not all(path) or not (path[0].isascii() and path[0].isdigit()):
+        raise InputError(
+            f"{name!r} names no number of a boundary: write boundaries, its place in the list from "
+            "0, and the number, such as boundaries.0.friction"
+        )
+    return path
 
 
 def layout(free: Mapping[str, Free | Field], simulation: Simulation, look: Look | None) -> Layout:

@@ -226,7 +226,8 @@ def fill(
     require_finite(gaussians, "filling")
     means = np.asarray(gaussians.means, np.float64)
     none = np.zeros((0, 3))
-    if len(means) < 5:
+    first = thinned(means, config.pitch / 4)[0] if len(means) else means
+    if len(first) < 5:  # places: no skin, and nothing that it could enclose
         return Filled(none, cell_volumes(means, config.spacing))
     origin, shape = _grid(means, config)
     density = density_field(gaussians, origin, shape, config)
@@ -252,7 +253,6 @@ def fill(
     # Between the two lies the skin; what is far from it on either side is known.
     solid = density > config.density_threshold
     without = places[~solid[cell] & ~within]
-    first, _ = thinned(means, config.pitch / 4)
     body = enclosed(means[first], places[within], without)
     fine = config.pitch / SAMPLES
     samples = body.samples(corner, fine, SAMPLES * count)

@@ -35,7 +35,7 @@ from jaxphys.scene.obstacles import (
     triangles_of,
     with_sources,
 )
-from jaxphys.scene.scene import Scene
+from jaxphys.scene.scene import Object, Scene
 from jaxphys.scene.source import find, load_object
 
 Watch = Callable[[str, int], None]
@@ -108,8 +108,8 @@ def animate(
                 load_object(thing, beside, scene.seed + i, f"objects[{i}]")
                 for i, thing in enumerate(scene.objects)
             )
-            inputs = (*inputs, *source_files(scene, beside))
-    require_room(at_least(scene, sum(one.count for one in objects)), room())
+            inputs = (*inputs, *source_files(scene.objects, beside))
+    require_room(at_least(scene, objects), room())
     held_to = None
     if tolerance is not None:
         with timing.stage("pilots"):
@@ -119,7 +119,7 @@ def animate(
             tell(before_text(held_to))
     meshes = [mesh_file(scene, i) for i in mesh_obstacles(scene)]
     inputs = (*inputs, *meshes)
-    written = _with_written_sources(scene)
+    written = with_written_sources(scene)
     shapes = [path.read_bytes() for path in meshes]
     identity = fingerprint(b"animate", _text(written), objects, *shapes)
     names = products(scene, save_splats)
@@ -144,9 +144,9 @@ def products(scene: Scene, save_splats: bool) -> list[str]:
     return [*MADE, *UNFINISHED, *_object_names(scene), *obstacles, *map(splats_name, splats)]
 
 
-def source_files(scene: Scene, beside: Path | None) -> list[Path]:
-    """The files that the objects of a scene are read from."""
-    return [find(thing.source, beside) for thing in scene.objects if thing.source is not None]
+def source_files(objects: tuple[Object, ...], beside: Path | None) -> list[Path]:
+    """The files that some objects of a scene are read from."""
+    return [find(thing.source, beside) for thing in objects if thing.source is not None]
 
 
 def animate_in(
@@ -249,7 +249,7 @@ def splats_name(frame: int) -> str:
     return f"splats/{frame:04d}.ply"
 
 
-def _with_written_sources(scene: Scene) -> Scene:
+def with_written_sources(scene: Scene) -> Scene:
     """The scene with its objects and obstacles read from where the run writes them."""
     scene = with_sources(scene, _obstacle_names(scene))
     things = tuple(
@@ -265,7 +265,7 @@ def _write_inputs(folder: RunFolder, scene: Scene, objects: tuple[Gaussians, ...
         write_triangles(folder.file(name), triangles_of(scene, i))
     for name, gaussians in zip(_object_names(scene), objects, strict=True):
         write_ply(folder.file(name), gaussians)
-    scene = _with_written_sources(scene)
+    scene = with_written_sources(scene)
     write_scene(folder.file("config.json"), scene)
     return scene
 

@@ -152,7 +152,7 @@ def _as_file(folder: Path, found: _Source) -> _Source:
     placement = place_objects(scene, objects)[0].placement
     return replace(
         found,
-        inputs=(*found.inputs, *source_files(scene, folder)),
+        inputs=(*found.inputs, *source_files(scene.objects, folder)),
         frames=lambda: (
             NumberedGaussians(frame.number, placement.undone(frame.gaussians))
             for frame in found.frames()
@@ -236,7 +236,7 @@ def _run(folder: Path, asked: str | None) -> _Source:
         numbers,
         single,
         scene.fps,
-        (*decides, *source_files(scene, folder), *meshes),
+        (*decides, *source_files(scene.objects, folder), *meshes),
         decides,
         lambda: _again(folder, scene, numbers),
     )

@@ -22,14 +22,16 @@ from jaxphys.fitting.result import ARRAYS, HISTORY, RESULT, Fit
 from jaxphys.gaussians.gaussians import from_points, to_splats
 from jaxphys.page.curves import curves
 from jaxphys.page.html import bundled, document
+from jaxphys.pipeline.animate import source_files
 from jaxphys.pipeline.draw import draw
 from jaxphys.pipeline.framing import frame_cameras
 from jaxphys.pipeline.video import VideoWriter
 from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import render
 from jaxphys.scene.build import build, validate
+from jaxphys.scene.obstacles import located, mesh_file, mesh_obstacles
 from jaxphys.scene.read import read_scene
-from jaxphys.scene.source import find, load_object
+from jaxphys.scene.source import load_object
 from jaxphys.scene.view import View
 
 EVALUATIONS, CURVES, VIDEO = "evaluations/", "curves.html", "comparison.mp4"
@@ -68,6 +70,7 @@ def fit_file(
     scene = read_scene(path.parent / config.scene).scene
     validate(scene)
     beside = (path.parent / config.scene).parent
+    scene = located(scene, beside)
     objects = [
         load_object(thing, beside, scene.seed + i, f"objects[{i}]")
         for i, thing in enumerate(scene.objects)
@@ -75,8 +78,8 @@ def fit_file(
     simulation, look = build(scene, *objects)
     observed = [one.read(path.parent) for one in config.observed]
     layout(config.free, simulation, look)  # a wrong name is told before anything is made
-    sources = [find(thing.source, beside) for thing in scene.objects if thing.source is not None]
-    inputs = [path, path.parent / config.scene, *sources]
+    inputs = [path, path.parent / config.scene, *source_files(scene.objects, beside)]
+    inputs += [mesh_file(scene, i) for i in mesh_obstacles(scene)]
     inputs += [one.path(path.parent) for one in config.observed]
     files = tuple(source.read_bytes() for source in inputs)
     identity = fingerprint(b"fit", *files)

@@ -18,13 +18,21 @@ from jaxphys.core.seals import is_sound, seal
 from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.gaussians.ply import read_ply, write_ply
 from jaxphys.guidance.prompts.refine import Refinement, check_prompt, refine
-from jaxphys.pipeline.animate import Watch, animate_in, products
+from jaxphys.pipeline.animate import (
+    Watch,
+    animate_in,
+    products,
+    source_files,
+    with_written_sources,
+)
 from jaxphys.pipeline.output import Timing
 from jaxphys.pipeline.resume import FOLDER
 from jaxphys.pipeline.saving import saving
 from jaxphys.scene.build import validate
 from jaxphys.scene.json import to_json
+from jaxphys.scene.obstacles import located, mesh_file, mesh_obstacles
 from jaxphys.scene.scene import Generation, Scene
+from jaxphys.scene.source import load_object
 
 PROMPT = "prompt.json"
 
@@ -51,6 +59,7 @@ def generate(
     scene: Scene,
     out: str | os.PathLike,
     *,
+    beside: Path | None = None,
     save_splats: bool = False,
     overwrite: bool = False,
     inputs: tuple[Path, ...] = (),
@@ -65,9 +74,9 @@ def generate(
 
     Args:
         prompt: the sentence; None takes the one in the scene.
-        scene: whose first object the sentence describes.
+        scene: whose first object the sentence describes; others are read from their sources.
         out: the directory: new, empty, or of an earlier run of the same request.
-        save_splats, overwrite, inputs, progress, watch: as for `animate`.
+        beside, save_splats, overwrite, inputs, progress, watch: as for `animate`.
         changes: fields of `Generation` that differ from those in the scene, such as `steps`,
             `splats`, `prior`, `shape_prior`; None changes nothing.
 
@@ -84,8 +93,17 @@ def generate(
         library.require_known(generation.prompt)
     elif generation.prior == choice.BUNDLED and not library.is_known(generation.prompt):
         print(f"jaxphys: {library.unknown(generation.prompt)}", file=sys.stderr)
+    scene = located(scene, beside)
+    others = tuple(
+        load_object(thing, beside, scene.seed + i, f"objects[{i}]")
+        for i, thing in enumerate(scene.objects)
+        if i > 0
+    )
+    meshes = [mesh_file(scene, i) for i in mesh_obstacles(scene)]
+    inputs = (*inputs, *source_files(scene.objects[1:], beside), *meshes)
     # Everything that is asked for decides the result, the refiner too.
-    identity = fingerprint(b"generate", _text(scene))
+    shapes = [path.read_bytes() for path in meshes]
+    identity = fingerprint(b"generate", _text(with_written_sources(scene)), others, *shapes)
     names = [PROMPT, *products(scene, save_splats)]
     with run_folder(out, identity, names, inputs=inputs, overwrite=overwrite) as folder:
         refinement = _refined(generation, folder, identity)
@@ -102,7 +120,7 @@ def generate(
         return animate_in(
             folder,
             scene,
-            (gaussians,),
+            (gaussians, *others),
             save_splats=save_splats,
             progress=progress,
             timing=timing,

@@ -9,8 +9,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import jax
+import numpy as np
 
 from jaxphys.core.errors import InputError
+from jaxphys.gaussians.gaussians import Gaussians, opacities
 from jaxphys.mpm.loop.chunks import cuts
 from jaxphys.mpm.loop.window import windowed
 from jaxphys.pipeline.film import drawn_at_once
@@ -42,26 +44,34 @@ def expected(scene: Scene, built: Built) -> dict[str, int]:
     chunk = max(into.size for into in cuts(config.runs, placement))
     window = windowed(config, simulation.state).computed.nodes
     arrays = jax.tree.leaves((simulation.state, simulation.model))
-    drawn = look.gaussians.count
+    moving = look.gaussians.count
+    drawn = moving + sum(one.count for one, _ in look.solids)
+    drawn += 0 if look.still is None else look.still.count
     return {
         "program": PROGRAM,
         "state and parameters": STATES * sum(leaf.nbytes for leaf in arrays),
         "grid": NODES * row * window * placement.devices,
         "transfers": stencil * row * placement.devices * chunk,
-        "motion": CARRIED * drawn * scene.frames,
+        "motion": CARRIED * moving * scene.frames,
         "splats": SPLAT * drawn * drawn_at_once(scene.frames),
         "pictures": PIXEL * scene.width * scene.height * drawn_at_once(scene.frames),
     }
 
 
-def at_least(scene: Scene, gaussians: int) -> dict[str, int]:
+def at_least(scene: Scene, objects: tuple[Gaussians, ...]) -> dict[str, int]:
     """What a run takes of memory even if nothing is filled and all matter stays where it is, from
-    the scene and the number of its Gaussians alone: nothing is made for it.
+    the scene and its Gaussians alone: nothing is made for it.
     """
-    at_once = drawn_at_once(scene.frames)
+    at_once, moving, drawn = drawn_at_once(scene.frames), 0, 0
+    for thing, gaussians in zip(scene.objects, objects, strict=False):
+        if thing.crop:
+            continue  # how much of it is background is not known yet
+        seen = int(np.sum(np.asarray(opacities(gaussians)) >= thing.opacity_threshold))
+        drawn += seen
+        moving += seen if thing.area is None else 0
     return {
-        "motion": CARRIED * gaussians * scene.frames,
-        "splats": SPLAT * gaussians * at_once,
+        "motion": CARRIED * moving * scene.frames,
+        "splats": SPLAT * drawn * at_once,
         "pictures": PIXEL * scene.width * scene.height * at_once,
     }
 

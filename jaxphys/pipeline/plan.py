@@ -183,7 +183,7 @@ def make_plan(
     tolerance: float | None = None,
     tell: Callable[[str], None] | None = None,
 ) -> Plan:
-    """The plan of a scene; a ball stands in for each object that has no source.
+    """The plan of a scene's film; a ball stands in for each object that has no source.
 
     Args:
         scene: to be planned.
@@ -196,6 +196,7 @@ def make_plan(
     Raises:
         InputError: the scene cannot be built, or not be held to the tolerance.
     """
+    scene = scene.filmed()
     objects = tuple(
         stand_in(thing, f"objects[{i}]")
         if thing.source is None
@@ -308,7 +309,7 @@ def describe(scene: Scene, built: Built) -> Plan:
 
 def _stepping_text(scene: Scene) -> str:
     """How a film of this scene is stepped through."""
-    stepping = scene.filmed().stepping
+    stepping = scene.stepping
     if isinstance(stepping, Adaptive):
         return (
             f"adaptive, the bounds looked at again every {stepping.every} steps; "

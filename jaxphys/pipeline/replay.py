@@ -6,8 +6,8 @@ A run keeps its scene and its Gaussians, which decide every frame to the byte, b
 
 import json
 import math
-from dataclasses import dataclass, replace
-from itertools import islice
+from dataclasses import dataclass
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,11 @@ from tqdm import tqdm
 from jaxphys.core.errors import InputError
 from jaxphys.core.reading import reading
 from jaxphys.gaussians import harmonics as sh
-from jaxphys.gaussians.colour import colour_range, regularise, to_unit_interval
+from jaxphys.gaussians.colour import regularise
 from jaxphys.gaussians.gaussians import Gaussians, concatenate, opacities, select, with_degree
 from jaxphys.gaussians.ply import read_ply
-from jaxphys.page.motion_data import Moving, enlarged_by, some_of, thinning_note
+from jaxphys.mpm.simulation import Simulation
+from jaxphys.page.motion_data import Moving, some_of, thinning_note
 from jaxphys.pipeline.deform import bake
 from jaxphys.pipeline.draw import placed_solids
 from jaxphys.pipeline.frames import frames
@@ -30,7 +31,8 @@ from jaxphys.render.camera import Camera, position
 from jaxphys.scene.build import build
 from jaxphys.scene.look import Look
 from jaxphys.scene.obstacles import located
-from jaxphys.scene.placement import AS_IT_IS, Placement
+from jaxphys.scene.place import fewer
+from jaxphys.scene.placement import Placement
 from jaxphys.scene.read import read_scene
 from jaxphys.scene.scene import Scene
 from jaxphys.scene.source import load_object
@@ -101,91 +103,94 @@ def replay(directory: Path, *, progress: bool = False) -> Replay:
     with reading(directory / "config.json"):
         scene = located(read_scene(directory / "config.json").scene.filmed(), directory)
     rows = read_metrics(directory / "metrics.jsonl")
-    splats = [directory / "splats" / f"{number:04d}.ply" for number in range(scene.frames)]
-    # Only a build knows where the contents of the object's file went.
-    by_itself = scene.camera.photograph is None and scene.camera.units == "metres"
-    if by_itself and len(rows) == scene.frames and all(path.is_file() for path in splats):
-        return _from_splats(scene, splats, rows)
-    return _computed(scene, directory, rows, progress)
-
-
-def _from_splats(scene: Scene, paths: list[Path], rows: list[dict[str, Any]]) -> Replay:
-    first = read_ply(paths[0])
-    chosen = _chosen(first)
-    kept = []
-    for path in paths:
-        gaussians = read_ply(path)
-        if gaussians.count != first.count:
-            raise InputError(f"{path}: holds {gaussians.count} Gaussians, {paths[0]} {first.count}")
-        kept.append(_enlarged(select(gaussians, chosen), first.count))
-    colours = _colours(first, scene.regularise_colours)[chosen]
-    seconds = np.asarray([row["time"] for row in rows], np.float64)
-    moving = _moving(kept, colours, seconds, first.count)
-    shown = [np.asarray(one.means) for one in kept]
-    return Replay(scene, moving, *_seen(scene, shown, shown[0], AS_IT_IS))
-
-
-def _computed(scene: Scene, directory: Path, rows: list[dict[str, Any]], progress: bool) -> Replay:
-    """By the very loop that the film took its frames from."""
     things = tuple(
         load_object(thing, directory, scene.seed + i, f"objects[{i}]")
         for i, thing in enumerate(scene.objects)
     )
     simulation, look = build(scene, *things)
-    chosen = _chosen(look.gaussians)
-    moved = _enlarged(select(with_degree(look.gaussians, 0), chosen), look.gaussians.count)
-    rest = []
-    if look.still is not None:
-        rest = [_enlarged(select(look.still, _chosen(look.still)), look.still.count)]
-    kept, points, seconds = [], [], []
-    found = islice(frames(simulation, particles=simulation.carriers), scene.frames)
-    bar = tqdm(found, desc=directory.name, total=scene.frames, unit="frame", disable=not progress)
-    for moment in bar:
-        places, gradients = moment.frame.carried()
-        points.append(np.asarray(places))
-        baked = bake(moved, places[chosen], gradients[chosen])
-        kept.append(concatenate([baked, *rest, *placed_solids(look, moment.frame)]))
-        seconds.append(float(moment.frame.time))
-    notes = _difference(moment.metrics, rows, points)
-    shades = [_shades(look)[chosen], *(_colours(one, False) for one in rest)]
-    solids = placed_solids(look, moment.frame)
-    shades += [_colours(one, False) for one in solids]
-    total = look.gaussians.count + sum(one.count for one in solids)
-    total += 0 if look.still is None else look.still.count
-    moving = _moving(kept, np.concatenate(shades), np.asarray(seconds), total, notes)
+    files = [directory / "splats" / f"{number:04d}.ply" for number in range(scene.frames)]
+    if len(rows) == scene.frames and all(path.is_file() for path in files):
+        kept, points, seconds, notes = _from_splats(look, files, rows)
+    else:
+        bar = directory.name if progress else None
+        kept, points, seconds, notes = _computed(scene, simulation, look, rows, bar)
+    total = sum(one.count for one in _parts(look))
+    moving = _moving(kept, _colours(look), seconds, total, notes)
     ground = points[0]
     if look.still is not None:
         points[0] = np.concatenate([points[0], np.asarray(look.still.means)])
     return Replay(scene, moving, *_seen(scene, points, ground, look.placements[0]))
 
 
-def _chosen(gaussians: Gaussians) -> np.ndarray:
-    """Which of the Gaussians are kept."""
-    if gaussians.count <= MOST_GAUSSIANS:
-        return np.arange(gaussians.count)
-    return some_of(gaussians.count, MOST_GAUSSIANS)
+# Frames of what is shown, places of what moves (K, 3) at each [m], times [s], and notes.
+_Frames = tuple[list[Gaussians], list[np.ndarray], np.ndarray, tuple[str, ...]]
 
 
-def _enlarged(some: Gaussians, total: int) -> Gaussians:
-    """Gaussians that stand for `total`."""
-    return replace(some, log_scales=some.log_scales + math.log(enlarged_by(total, some.count)))
+def _from_splats(look: Look, paths: list[Path], rows: list[dict[str, Any]]) -> _Frames:
+    """As the run kept them, in the order in which `deformed_gaussians` puts what is drawn."""
+    counts = [one.count for one in _parts(look)]
+    kept, points = [], []
+    for path in paths:
+        gaussians = with_degree(read_ply(path), 0)
+        if gaussians.count != sum(counts):
+            raise InputError(
+                f"{path}: holds {gaussians.count} Gaussians, the run's scene {sum(counts)}; make "
+                "the run again"
+            )
+        ends = np.cumsum([0, *counts]).tolist()
+        parts = [select(gaussians, slice(*pair)) for pair in pairwise(ends)]
+        kept.append(concatenate([fewer(part, MOST_GAUSSIANS) for part in parts]))
+        points.append(np.asarray(parts[0].means))
+    return kept, points, np.asarray([row["time"] for row in rows], np.float64), ()
 
 
-def _colours(gaussians: Gaussians, regular: bool) -> np.ndarray:
-    """What is the same from all sides of the colours, (N, 3) in [0, 1]."""
-    rgb = sh.dc_to_rgb(gaussians.harmonics[:, 0])
-    if regular:
-        rgb = regularise(rgb, to_unit_interval(colour_range(gaussians)))
-    return np.clip(np.asarray(rgb, np.float64), 0, 1)
+def _computed(
+    scene: Scene,
+    simulation: Simulation,
+    look: Look,
+    rows: list[dict[str, Any]],
+    bar: str | None,
+) -> _Frames:
+    """By the very loop that the film took its frames from; bar: what is written beside one."""
+    chosen = _chosen(look.gaussians.count)
+    moved = fewer(with_degree(look.gaussians, 0), MOST_GAUSSIANS)
+    rest = [] if look.still is None else [fewer(look.still, MOST_GAUSSIANS)]
+    kept, points, seconds = [], [], []
+    found = islice(frames(simulation, particles=simulation.carriers), scene.frames)
+    for moment in tqdm(found, desc=bar, total=scene.frames, unit="frame", disable=bar is None):
+        places, gradients = moment.frame.carried()
+        points.append(np.asarray(places))
+        baked = bake(moved, places[chosen], gradients[chosen])
+        solids = [fewer(one, MOST_GAUSSIANS) for one in placed_solids(look, moment.frame)]
+        kept.append(concatenate([baked, *rest, *solids]))
+        seconds.append(float(moment.frame.time))
+    notes = _difference(moment.metrics, rows, points)
+    return kept, points, np.asarray(seconds), notes
 
 
-def _shades(look: Look) -> np.ndarray:
-    """The colours of what moves, regularised object by object as the film does."""
-    rgb = sh.dc_to_rgb(look.gaussians.harmonics[:, 0])
+def _parts(look: Look) -> list[Gaussians]:
+    """What is drawn: what moves, what does not, and each obstacle in its own axes."""
+    still = [] if look.still is None else [look.still]
+    return [look.gaussians, *still, *(solid for solid, _ in look.solids)]
+
+
+def _chosen(count: int) -> np.ndarray:
+    """Which of so many Gaussians are kept."""
+    return np.arange(count) if count <= MOST_GAUSSIANS else some_of(count, MOST_GAUSSIANS)
+
+
+def _colours(look: Look) -> np.ndarray:
+    """What is the same from all sides of the colours of what is kept, (N, 3) in [0, 1]: of what
+    moves regularised object by object, as the film has it.
+    """
+    shades = [sh.dc_to_rgb(one.harmonics[:, 0]) for one in _parts(look)]
     if look.colours is not None:
-        parts = zip(look.objects, look.colours, strict=True)
-        rgb = jnp.concatenate([regularise(rgb[a:b], limits) for (a, b), limits in parts])
-    return np.clip(np.asarray(rgb, np.float64), 0, 1)
+        pairs = zip(look.objects, look.colours, strict=True)
+        shades[0] = jnp.concatenate(
+            [regularise(shades[0][a:b], limits) for (a, b), limits in pairs]
+        )
+    kept = [rgb[_chosen(one.count)] for rgb, one in zip(shades, _parts(look), strict=True)]
+    return np.clip(np.asarray(jnp.concatenate(kept), np.float64), 0, 1)
 
 
 def _moving(
@@ -193,7 +198,7 @@ def _moving(
     colours: np.ndarray,
     seconds: np.ndarray,
     total: int,
-    notes: tuple[str, ...] = (),
+    notes: tuple[str, ...],
 ) -> Moving:
     count = kept[0].count
     if count < total:

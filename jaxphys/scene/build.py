@@ -110,8 +110,10 @@ def solver_grid(scene: Scene) -> Grid:
     return Grid(scene.domain.shape, scene.domain.spacing)
 
 
-def place_objects(scene: Scene, objects: tuple[Gaussians, ...]) -> tuple[Placed, ...]:
-    """Every object in its place, and filled.
+def place_objects(
+    scene: Scene, objects: tuple[Gaussians, ...], most: int | None = None
+) -> tuple[Placed, ...]:
+    """Every object in its place, and filled; of each at most so many Gaussians, see `place`.
 
     Raises:
         InputError: not one set of Gaussians for each object, or one that cannot be placed.
@@ -122,7 +124,7 @@ def place_objects(scene: Scene, objects: tuple[Gaussians, ...]) -> tuple[Placed,
         )
     grid = solver_grid(scene)
     return tuple(
-        place(gaussians, thing, grid, scene.transfer.spline, f"objects[{i}]", scene.seed + i)
+        place(gaussians, thing, grid, scene.transfer.spline, f"objects[{i}]", scene.seed + i, most)
         for i, (gaussians, thing) in enumerate(zip(objects, scene.objects, strict=True))
     )
 

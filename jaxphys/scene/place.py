@@ -28,6 +28,7 @@ from jaxphys.gaussians.relax import blue_noise
 from jaxphys.gaussians.volumes import cell_volumes
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.transfer.kernels import Kernel
+from jaxphys.page.motion_data import enlarged_by, some_of
 from jaxphys.scene.placement import Placement
 from jaxphys.scene.scene import Object
 
@@ -86,7 +87,13 @@ def _upright(up: str) -> np.ndarray:
 
 
 def place(
-    gaussians: Gaussians, thing: Object, grid: Grid, kernel: Kernel, where: str, seed: int
+    gaussians: Gaussians,
+    thing: Object,
+    grid: Grid,
+    kernel: Kernel,
+    where: str,
+    seed: int,
+    most: int | None = None,
 ) -> Placed:
     """The Gaussians of an object in the domain, its filling and its volumes.
 
@@ -99,6 +106,8 @@ def place(
         grid, kernel: of the solver.
         where: the object's name in messages.
         seed: of the filling.
+        most: of what moves, and of what does not, at most so many Gaussians, chosen once all of
+            them have said where the object is and how large; None: all.
 
     Raises:
         InputError: nothing is opaque enough or inside `area`, or the object sticks out of the
@@ -131,6 +140,8 @@ def place(
     middle, scale = _frame(means[kept], thing.size)
     own = transform(gaussians, scale=scale, translation=-scale * middle)
     moving, still = (select(own, np.flatnonzero(which)) for which in (kept, ~chosen))
+    if most is not None:
+        moving, still = fewer(moving, most), fewer(still, most)
     centre = np.array(thing.centre)
     _require_inside(np.asarray(moving.means) + centre, grid, kernel, where)
     filled = _fill(moving, thing, grid, seed, where)
@@ -146,6 +157,15 @@ def place(
     placement = Placement.of(rotation, scale, middle, centre)
     left_out = int(cropped + np.sum(chosen & ~kept))
     return Placed(moving, still, filling, volumes, left_out, placement)
+
+
+def fewer(gaussians: Gaussians, count: int) -> Gaussians:
+    """At most `count` of some Gaussians, enlarged so that a surface stays closed."""
+    if gaussians.count <= count:
+        return gaussians
+    chosen = select(gaussians, some_of(gaussians.count, count))
+    larger = np.float32(math.log(enlarged_by(gaussians.count, count)))
+    return replace(chosen, log_scales=chosen.log_scales + larger)
 
 
 def _frame(means: np.ndarray, size: float) -> tuple[np.ndarray, float]:

@@ -143,6 +143,12 @@ class Object(Checked):
     splats: int = field(default=20_000, metadata=between(1, MOST_SPLATS))
     grain: float = field(default=0.0, metadata=between(0, 1))
 
+    def made_of(self, material: str) -> "Object":
+        """The same thing of a material, with the numbers that this one has by itself."""
+        return replace(
+            self, material=material, law=None, mean_volume=False, parameters={}, regions=()
+        )
+
 
 @dataclass(frozen=True)
 class Domain(Checked):

@@ -86,14 +86,7 @@ def with_number(scene: Scene, key: str, value: float) -> Scene:
 def with_material(scene: Scene, i: int, material: str) -> Scene:
     """The scene with object `i` made of a material, with its own parameters."""
     get_material(material)
-    thing = replace(
-        scene.objects[i],
-        material=material,
-        law=None,
-        mean_volume=False,
-        parameters={},
-        regions=(),
-    )
+    thing = scene.objects[i].made_of(material)
     return replace(scene, objects=(*scene.objects[:i], thing, *scene.objects[i + 1 :]))
 
 

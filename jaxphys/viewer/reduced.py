@@ -3,10 +3,6 @@
 import math
 from dataclasses import replace
 
-import numpy as np
-
-from jaxphys.gaussians.gaussians import Gaussians, select
-from jaxphys.page.motion_data import enlarged_by, some_of
 from jaxphys.scene.scene import Filling, Object, Scene
 
 
@@ -34,12 +30,3 @@ def _filled_for(thing: Object, spacing: float) -> Object:
 def _coarser(filling: Filling, spacing: float) -> Filling:
     assert filling.spacing is not None
     return replace(filling, spacing=max(filling.spacing, spacing))
-
-
-def fewer(gaussians: Gaussians, count: int) -> Gaussians:
-    """At most `count` of some Gaussians, enlarged so that a surface stays closed."""
-    if gaussians.count <= count:
-        return gaussians
-    chosen = select(gaussians, some_of(gaussians.count, count))
-    larger = np.float32(math.log(enlarged_by(gaussians.count, count)))
-    return replace(chosen, log_scales=chosen.log_scales + larger)

@@ -48,7 +48,7 @@ from jaxphys.viewer.events import (
 from jaxphys.viewer.hand import Hand
 from jaxphys.viewer.numbers import with_material, with_number
 from jaxphys.viewer.picking import met
-from jaxphys.viewer.reduced import fewer, reduced
+from jaxphys.viewer.reduced import reduced
 from jaxphys.viewer.shown import Shown, camera_of
 from jaxphys.viewer.sums import energies
 
@@ -105,7 +105,7 @@ class Session:
         self.playing, self.message = False, ""
         self._failed, self._compiled, self._grabs = False, set[Any](), 0
         small = self._small(self.scene)
-        self._placed = place_objects(small, tuple(fewer(one, gaussians) for one in objects))
+        self._placed = place_objects(small, objects, most=gaussians)
         self._begin()
 
     # --- what is to be seen -------------------------------------------------------------------
@@ -249,9 +249,18 @@ class Session:
         scene = replace(scene, substep=None, unsafe_substep=False, stepping=Adaptive())
         return reduced(scene, self._nodes)
 
+    def _build(self, scene: Scene) -> Built:
+        """A scene at the size that runs. Gravity is part of its program even where it is zero: the
+        slider goes there and comes back, and nothing begins anew."""
+        simulation, look = build(self._small(scene), placed=self._placed)
+        model = simulation.model
+        if model.gravity is None:
+            model = replace(model, gravity=jnp.zeros(3, model.mass.dtype))
+        return Built(replace(simulation, model=model), look)
+
     def _begin(self) -> None:
         """At the start of the scene as it is now."""
-        built = build(self.small, placed=self._placed)
+        built = self._build(self.scene)
         self._built, self._simulation = built, built.simulation
         config, model, state = (
             built.simulation.config,
@@ -287,7 +296,7 @@ class Session:
         began = list(scene.boundaries)
         for i, place in self._start_places.items():
             began[i] = _placed_at(began[i], place)
-        built = build(self._small(replace(scene, boundaries=tuple(began))), placed=self._placed)
+        built = self._build(replace(scene, boundaries=tuple(began)))
         self.scene = scene
         if _program_of(built.simulation) == self._program:
             self._built, self._simulation = built, built.simulation

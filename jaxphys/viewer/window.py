@@ -26,6 +26,7 @@ HOST = "127.0.0.1"  # and nothing else: whoever reaches the viewer commands it
 FIELD = math.radians(40)  # of view, from top to bottom
 ROOM = 1.3  # of the object's size, from the middle of the view to its end
 KEPT = 400  # frames that curves show
+ARROWS, AHEAD = 0.3, 0.4  # of the object's size: a hand's arrows, and how far before the matter
 CLAMPED = 1e4  # of a variance in units of the node, of 6.5e4 that half precision holds
 
 
@@ -61,6 +62,8 @@ class Window:
         self._splats: Any = None
         self._hand: Any = None
         self._grab: int | None = None
+        self._size = 1.0  # of the object [m]
+        self._ahead = np.zeros(3)  # from the matter that is held to the arrows [m]
         self._enlarged = 1.0
         self._curves: deque[tuple[float, ...]] = deque(maxlen=KEPT)
         self._last: int | None = None
@@ -84,6 +87,7 @@ class Window:
         low, high = np.quantile(points, [0.01, 0.99], axis=0)
         middle, size = (low + high) / 2, float(np.max(high - low))
         forward = np.asarray(camera.rotation, np.float64)[2]
+        self._size = size
         first = self.server.initial_camera
         first.look_at = middle
         first.position = middle - max(ROOM * size / math.tan(FIELD / 2), 1e-3) * forward
@@ -111,6 +115,8 @@ class Window:
             if panel is None:
                 return
             if panel.grabs:
+                along = np.asarray(event.ray_direction, np.float64)
+                self._ahead = -AHEAD * self._size * along / np.linalg.norm(along)
                 self._queue.put(Grab(event.ray_origin, event.ray_direction))
             else:
                 self._queue.put(Poke(event.ray_origin, event.ray_direction, panel.poke_speed))
@@ -146,7 +152,9 @@ class Window:
             self._splats.set_gaussians(centres, covariances, colours, opacities)
 
     def _draw_hand(self, shown: Shown) -> None:
-        """Arrows where matter was grabbed, until it is let go."""
+        """Arrows before the place where matter was grabbed, until it is let go: at the place
+        itself splats would hide them.
+        """
         wanted = None if shown.held is None else shown.grabs
         if wanted == self._grab:
             return
@@ -156,13 +164,18 @@ class Window:
         self._grab = wanted
         if shown.held is None:
             return
+        ahead = self._ahead
         self._hand = self.server.scene.add_transform_controls(
-            "/hand", scale=0.3, disable_rotations=True, depth_test=False, position=shown.held
+            "/hand",
+            scale=ARROWS * self._size,
+            disable_rotations=True,
+            depth_test=True,  # viser draws splats last, over what leaves no depth
+            position=_vector(np.asarray(shown.held) + ahead),
         )
 
         @self._hand.on_update
         def _(event) -> None:
-            self._queue.put(Drag(_vector(event.target.position)))
+            self._queue.put(Drag(_vector(event.target.position - ahead)))
 
     # --- the panel's curves -------------------------------------------------------------------
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import jaxphys.pipeline.fit as fit_module
 from jaxphys.cli.main import run
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.gaussians.ply import write_ply
@@ -95,6 +96,32 @@ def test_stopped_after_any_evaluation_it_ends_the_same(asked):
         break
     assert stopped >= 2
     assert bytes_of(out) == bytes_of(asked / "found")
+
+
+def test_an_obstacles_mesh_lies_beside_the_scene_and_decides_the_request(
+    asked, tmp_path, monkeypatch
+):
+    """From anywhere; the search, which has tests of its own, is left out."""
+    scene = json.loads((asked / "scene.json").read_text())
+    peg = {"type": "mesh", "source": "peg.obj", "centre": [0.8, 0.8, 0.3], "size": 0.1}
+    scene["boundaries"].append(peg | {"resolution": 8})
+    config = json.loads((asked / "fit.json").read_text()) | {"scene": "pegged.json"}
+    (asked / "pegged.json").write_text(json.dumps(scene))
+    (asked / "pegged_fit.json").write_text(json.dumps(config))
+    monkeypatch.setattr(fit_module, "fit", stopped)
+    monkeypatch.chdir(tmp_path)
+    marks = []
+    for height in (1, 2):
+        corners = f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {height}\n"
+        (asked / "peg.obj").write_text(corners + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+        with pytest.raises(KeyboardInterrupt):
+            fit_file(asked / "pegged_fit.json", tmp_path / f"out{height}")
+        marks.append((tmp_path / f"out{height}/.jaxphys-run").read_text())
+    assert marks[0] != marks[1]
+
+
+def stopped(*_, **__):
+    raise KeyboardInterrupt
 
 
 def test_one_line_names_what_cannot_be_read(asked, capsys):

@@ -47,7 +47,7 @@ def test_what_is_set_reaches_the_step():
     "setting, told",
     [
         ("youngs_modulus", r"^--set youngs_modulus: give a name and a value"),
-        ("youngs_module=1", r"^--set youngs_module: unknown key .*first object"),
+        ("youngs_module=1", r"^--set youngs_module: unknown key .*mean 'youngs_modulus'"),
         (
             "objects.0.parameters.young=1",
             r"^--set: objects\[0\]\.parameters: jelly: unknown .*young",

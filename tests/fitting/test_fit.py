@@ -27,7 +27,10 @@ from jaxphys.fitting import (
 )
 from jaxphys.fitting.motion import motion_at, steps_for
 from jaxphys.fitting.problem import Program
+from jaxphys.mpm.boundaries import Ball, Plane, Steady
+from jaxphys.scene.build import build
 from tests.mpm.cases import block, simulation_of
+from tests.pipeline.test_animate import small_scene, sphere
 
 COUNT = 40
 TIMES = (0.0, 0.01, 0.03)
@@ -229,6 +232,26 @@ def test_a_field_and_groups_reach_their_particles(simulation):
     (rough,) = numbers.roughness(jnp.asarray(vector))
     # Four pairs along x differ by log10 4 decades, over the 0.3 that are expected.
     assert float(jnp.sum(rough**2)) == pytest.approx(4 * (np.log10(4) / 0.3) ** 2)
+
+
+def test_how_a_boundary_moves_may_be_free():
+    pusher = Ball((0.5, 0.5, 0.2), radius=0.1, motion=Steady(velocity=(0.0, 0.0, 1.0)))
+    scene = small_scene(boundaries=(Plane((0.5, 0.5, 0.2)), pusher))
+    made, _ = build(scene, sphere())
+    free = {
+        "boundaries.1.motion.velocity": Free((0.0, 0.0, 1.0)),
+        "boundaries.1.motion.spin": Free((0.0, 0.0, 0.0)),
+        "boundaries.0.friction": Log(0.3),
+    }
+    numbers = layout(free, made, None)
+    vector = jnp.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, np.log(0.7)])
+    plane, ball = numbers.applied(made, None, vector)[0].model.boundaries
+    np.testing.assert_allclose(ball.motion.velocity, (1, 2, 3))
+    np.testing.assert_allclose(ball.motion.spin, (4, 5, 6))
+    assert float(plane.friction) == pytest.approx(0.7)
+    for name in ("boundaries.friction", "boundaries.first.friction", "boundaries.0."):
+        with pytest.raises(InputError, match=r"names no number of a boundary: write"):
+            layout({name: Free(0.3)}, made, None)
 
 
 def test_a_number_whose_best_is_beyond_its_bound_ends_beside_it(simulation, truth):

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from jaxphys.core.errors import InputError
-from jaxphys.gaussians.filling import FillingConfig, fill_interior, inner_cells
+from jaxphys.gaussians.filling import FillingConfig, fill, fill_interior, inner_cells
 from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.gaussians.relax import blue_noise
 from jaxphys.gaussians.surface import facing
@@ -177,3 +177,12 @@ def test_sparse_and_dense_shells_are_filled_by_the_same_default(count):
     fixed = fill_interior(shell, FillingConfig(spacing, density_threshold=2.0))
     hollow = np.linalg.norm(fixed, axis=1) < 0.7
     assert (hollow.sum() < 0.5 * middle.sum()) == (count == 900)
+
+
+@pytest.mark.parametrize("width", [0.0, 1e-4])
+def test_what_is_smaller_than_a_cell_is_no_skin(width):
+    """Splats at one place, or nearly, are filled by nothing and weigh as one particle does."""
+    points = width * np.random.default_rng(0).random((50, 3)) + 0.3
+    filled = fill(from_points(points, np.full(3, 0.5), 0.1), CONFIG)
+    assert len(filled.points) == 0
+    assert filled.volumes.sum() <= 0.1**3 * (1 + 1e-9) and filled.volumes.min() > 0

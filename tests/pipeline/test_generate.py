@@ -11,11 +11,12 @@ import jaxphys.guidance.choice as choice
 import jaxphys.guidance.optimise as optimise
 from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
+from jaxphys.gaussians.ply import write_ply
 from jaxphys.guidance.prompts.refine import Refinement
 from jaxphys.pipeline import generate as generate_module
 from jaxphys.pipeline import saving
 from jaxphys.pipeline.generate import generate
-from jaxphys.scene import Domain, Object, Scene, read_scene
+from jaxphys.scene import Domain, MeshObstacle, Object, Scene, read_scene
 
 SCENE = Scene(
     objects=(
@@ -220,3 +221,24 @@ def test_what_the_priors_never_saw_is_told_and_tried(calls, tmp_path, capsys):
     assert "pangolin" in capsys.readouterr().err and len(calls) == 1
     generate("a can", SCENE, tmp_path, overwrite=True)
     assert capsys.readouterr().err == ""
+
+
+def test_other_objects_and_obstacles_are_read_from_beside_the_scene(calls, tmp_path, monkeypatch):
+    """Before anything is generated: what is missing is told at once."""
+    (tmp_path / "scene").mkdir()
+    points = np.random.default_rng(1).normal(size=(30, 3)).astype(np.float32)
+    write_ply(tmp_path / "scene/other.ply", from_points(points, np.full(3, 0.5), 0.3))
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+    (tmp_path / "scene/peg.obj").write_text(corners + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
+    (thing,) = SCENE.objects
+    made = dataclasses.replace(thing, size=0.25, centre=(0.3, 0.5, 0.5))
+    other = dataclasses.replace(made, source="other.ply", centre=(0.7, 0.5, 0.5))
+    peg = MeshObstacle((0.5, 0.5, 0.2), source="peg.obj", size=0.1, resolution=8)
+    scene = dataclasses.replace(SCENE, objects=(made, other), boundaries=(peg,), frames=1)
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r"other\.ply: no such file"):
+        generate("a strawberry", scene, "none", steps=3, splats=40)
+    assert not calls
+    out = generate("a strawberry", scene, "out", beside=tmp_path / "scene", steps=3, splats=40)
+    assert (out / "gaussians_1.ply").read_bytes() == (tmp_path / "scene/other.ply").read_bytes()
+    assert (out / "obstacle_0.ply").exists() and (out / "gaussians.ply").exists()

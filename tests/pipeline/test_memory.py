@@ -59,11 +59,32 @@ def test_more_of_each_takes_more_of_what_it_is():
     assert longer["motion"] == 10 * needed["motion"] and wider["pictures"] == 2 * needed["pictures"]
     finer = expected(asked, build(asked, ball(1000)))
     assert finer["state and parameters"] > 1.8 * needed["state and parameters"]
-    assert all(size <= needed[name] for name, size in at_least(asked, 500).items())
+    assert all(size <= needed[name] for name, size in at_least(asked, (ball(500),)).items())
     plan = describe(asked, made)
     assert f"memory at the peak: {sum(needed.values()) / 2**20:.0f} MiB" in as_text(plan)
     assert "does not fit" in as_text(replace(plan, room=10**6))
     assert "does not fit" not in as_text(replace(plan, room=None))
+
+
+def test_what_takes_no_part_needs_no_room():
+    """Faint splats are in nobody's memory; of a crop nobody knows yet; what stands still is drawn,
+    and its motion not kept.
+    """
+    asked, things = scene(), (ball(500),)
+    (thing,) = asked.objects
+    whole = at_least(asked, things)
+
+    def of(**changes):
+        return at_least(replace(asked, objects=(replace(thing, **changes),)), things)
+
+    assert whole["motion"] > 0 and of(opacity_threshold=0.99)["splats"] == 0
+    assert of(crop=True)["motion"] == of(crop=True)["splats"] == 0
+    half = replace(asked, objects=(replace(thing, area=(-1.0, 1.0, -1.0, 1.0, 0.0, 1.0)),))
+    assert at_least(half, things)["motion"] == 0
+    assert at_least(half, things)["splats"] == whole["splats"]
+    made = build(half, *things)
+    needed = expected(half, made)
+    assert needed["splats"] == whole["splats"] and needed["motion"] == whole["motion"] / 2
 
 
 PEAK = """

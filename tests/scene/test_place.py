@@ -141,6 +141,23 @@ def test_lone_splats_are_left_out_and_hollow_things_kept():
     assert sparse.lone == 0 and sparse.moving.count == 60
 
 
+def test_fewer_splats_are_where_all_of_them_are():
+    """A body with a thin stalk, of which hardly a splat is left: where it is and how large all of
+    them say, and not those that stay."""
+    random = np.random.default_rng(0)
+    stalk = np.zeros((40, 3))
+    stalk[:, 2] = np.linspace(0.5, 2.0, 40)
+    points = np.concatenate([random.uniform(-0.5, 0.5, (2000, 3)), stalk]).astype(np.float32)
+    thing, grid = Object(size=0.5, centre=(0.5, 0.5, 0.5), filling=None), Grid((16,) * 3, 1 / 15)
+    gaussians = from_points(points, np.full(3, 0.5), 0.02)
+    whole, some = (
+        place(gaussians, thing, grid, QUADRATIC, "objects[0]", 0, most) for most in (None, 100)
+    )
+    assert some.moving.count == 100 and some.placement == whole.placement
+    body = np.asarray(some.moving.means)[:, :2]
+    np.testing.assert_allclose(np.ptp(body, axis=0), 0.5 / 2.5, atol=0.02)
+
+
 def test_what_cannot_be_placed_names_its_field():
     def refuse(match, **changes):
         with pytest.raises(InputError, match=match):

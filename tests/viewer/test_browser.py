@@ -1,6 +1,7 @@
 """The viewer in a real browser: what it shows, and what a hand in it does."""
 
 import io
+import json
 import threading
 
 import numpy as np
@@ -10,6 +11,7 @@ from PIL import Image
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.gaussians.ply import write_ply
 from jaxphys.mpm.boundaries import Plane
+from jaxphys.scene.json import scene_from_json
 from jaxphys.scene.scene import Domain, Object, Scene
 from jaxphys.viewer.serve import view_scene
 from tests.browsers import started
@@ -142,6 +144,60 @@ def test_a_click_pokes(page):
         page.wait_for_selector(f"text=/^frame {number},/", timeout=120_000)
     at(page, 8)
     assert apart(still, seen(page)) > MOVED
+
+
+def chosen(page, what):
+    """What a click does from now on."""
+    shown = page.locator("input").filter(visible=True).all()
+    next(one for one in shown if one.input_value() in ("pokes", "grabs")).click()
+    page.get_by_role("option", name=what, exact=True).click()
+    page.wait_for_timeout(500)
+
+
+def test_a_grab_shows_arrows_that_pull(page):
+    still = forward(page, 8)
+    press(page, "Reset")
+    at(page, 0)
+    chosen(page, "grabs")
+    before = seen(page)
+    page.mouse.click(SCENE["width"] // 2, SCENE["height"] // 2)
+    page.wait_for_timeout(2500)
+    arrows = np.abs(seen(page) - before).max(axis=-1) > 60
+    assert arrows.sum() > 50  # before the object, not hidden by it
+    # The one that points upwards has its tip at the top.
+    y, x = (int(axis[0]) for axis in np.nonzero(arrows))
+    page.mouse.move(x, y + 6)
+    page.mouse.down()
+    page.mouse.move(x, y - 60, steps=6)
+    page.mouse.up()
+    page.wait_for_timeout(500)
+    for number in range(1, 9):
+        press(page, "Step")
+        page.wait_for_selector(f"text=/^frame {number},/", timeout=120_000)
+    at(page, 8)
+    pulled = seen(page)
+    press(page, "Let go")
+    chosen(page, "pokes")
+    assert apart(still, pulled) > MOVED
+
+
+def kept(page, button, name):
+    """The file that a button hands over, as a link."""
+    press(page, button)
+    link = page.locator(f"a[download='{name}']")
+    link.wait_for(timeout=120_000)
+    with page.expect_download() as got:
+        link.click()
+    return got.value.path().read_bytes()
+
+
+def test_what_is_kept_is_what_is_seen(page):
+    saved = scene_from_json(json.loads(kept(page, "Save scene", "scene.json")))
+    assert saved.objects[0].material == "elastic" and saved.domain.spacing == 0.1
+    picture = np.asarray(Image.open(io.BytesIO(kept(page, "Exact picture", "picture.png"))))
+    assert picture.shape == (600, 800, 3) and picture.std() > 5
+    press(page, "Plan the film")
+    page.wait_for_selector("text=/time, roughly/", timeout=300_000)
 
 
 def test_a_slider_acts(page):

@@ -111,6 +111,21 @@ def test_a_reset_gives_the_same_bytes(session):
     assert bytes_of(session) == there
 
 
+def test_gravity_goes_to_zero_and_back_and_nothing_begins_anew(session):
+    """In free flight momentum grows by m g t, and without gravity not at all."""
+    mass, t = session.moment.metrics["mass"], scene().frame_time
+    steps(session, 2)
+    for gravity in (0.0, 5.0):
+        before = session.shown().momentum[2]
+        session.do(SetNumber("gravity", gravity))
+        number = session.shown().number
+        steps(session, 1)
+        assert session.shown().number == number + 1 > 2
+        grown = session.shown().momentum[2] - before
+        assert grown == pytest.approx(-mass * gravity * t, abs=1e-3 * mass * t)
+        assert session.saved().gravity[2] == -gravity
+
+
 def test_a_frame_is_that_of_a_film(session):
     """The same motion as `animate` would draw: nobody's hands leave no trace."""
     steps(session, 6)
