@@ -94,6 +94,8 @@ def difference(ours: Mapping[Cell, float], without: Mapping[Cell, float]) -> Dif
 
 def order(found: Difference, better: int) -> str:
     """How that stands to the paper, in which every part helps."""
+    if found.objects < 2:
+        return "one object: no interval"
     low, high = sorted((better * found.low, better * found.high))
     if found.low == found.high == 0:
         return "**no difference at all**"
@@ -112,13 +114,14 @@ def table(lines: list[Line]) -> str:
                 continue
             found = difference(ours, without)
             level = np.mean([ours[cell] for cell in ours if cell in without])
+            ends = f"[{found.low:+.3f}, {found.high:+.3f}]" if found.objects > 1 else ""
             rows.append(
                 (
                     how,
                     measure + (" (less is better)" if better < 0 else ""),
                     f"{level:.3f}",
                     f"{level - found.mean:.3f}",
-                    f"{found.mean:+.3f} [{found.low:+.3f}, {found.high:+.3f}]",
+                    f"{found.mean:+.3f} {ends}".strip(),
                     f"{found.objects}, {found.pairs}",
                     f"{fall:+.3f}" if measure == "cosine" else "",
                     order(found, better),

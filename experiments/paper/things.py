@@ -45,7 +45,11 @@ def sentence_of(name: str, *, wordy: bool = False) -> str:
 
 
 def scene_of(shown: Shown, spacing: float = SPACING) -> Scene:
-    """The scene in which an object is filmed."""
+    """The scene in which an object is filmed, on a grid of some spacing [m] or, of what breaks, one
+    that is fine enough: planes of weakness that are thinner than a cell and a half do not part.
+    """
+    if shown.material == "fracture":
+        spacing = min(spacing, SPACING)
     if shown == MAIN["metal can"]:
         return pressed(default_scene("metal", spacing=spacing))
     return default_scene(shown.material, spacing=spacing)

@@ -109,6 +109,12 @@ def test_the_order_is_told_by_the_interval(ends, better, said):
     assert ablation.order(ablation.Difference(sum(ends) / 2, *ends, 3, 3), better) == said
 
 
+def test_one_object_has_no_interval():
+    found = ablation.difference({("can", 0): 1.0, ("can", 1): 3.0}, {("can", 0): 0.0})
+    assert found.mean == 1 and (found.objects, found.pairs) == (1, 1)
+    assert ablation.order(found, 1) == "one object: no interval"
+
+
 def object_line(name: str, seed: int, how: str, regular: float, raw: float) -> dict:
     found = {"first": 1.0, "saturation": 0.5, "distance": 0.1}
     return {
