@@ -1,7 +1,7 @@
 """The paper's evaluation: its films, tables and ablations, and one page of it all.
 
     python -m experiments.paper --out outputs/paper             # hours on two cores
-    python -m experiments.paper --out outputs/paper --quick     # some ten minutes
+    python -m experiments.paper --out outputs/paper --quick     # 22 minutes of CPU or so
     python -m experiments.paper --table benchmarks/lines/paper-quick.jsonl
     python -m experiments.paper --out outputs/paper --page      # from the films that are there
 

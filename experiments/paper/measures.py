@@ -65,7 +65,8 @@ def of_film(directory: Path, name: str) -> dict[str, Any]:
     try:
         published = evaluate(directory, overwrite=True)
     except InputError as error:
-        return found | {"unscored": " ".join(str(error).split())[:200]}
+        # What is missing; where it was looked for is told in parentheses.
+        return found | {"unscored": str(error).split(" (")[0]}
     found["clip"] = published["clip"]["cosine"]
     if "v2" in published["aesthetic"]:
         found["laion"] = published["aesthetic"]["v2"]["score"]
