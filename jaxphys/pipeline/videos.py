@@ -56,8 +56,8 @@ def write_videos(
     for path in paths:
         require_finished(path)
     entries = [
-        _entry(path, name, int(1e6 * megabytes), progress)
-        for path, name in zip(paths, titles or [None] * len(paths), strict=True)
+        _entry(path, None if titles is None else titles[i], int(1e6 * megabytes), progress)
+        for i, path in enumerate(paths)
     ]
     page = videos_page(entries, TITLE if title is None else title)
     with atomic_path(target) as aside:
