@@ -10,7 +10,7 @@ import argparse
 import importlib
 from pathlib import Path
 
-from experiments.fitting.lines import read, run
+from experiments.lines import read, run
 
 NAMES = ("published", "coverage", "field", "laws", "held_out", "kill")
 

@@ -7,9 +7,9 @@ from functools import partial
 
 import numpy as np
 
-from experiments.fitting.lines import Cases, Line, markdown
 from experiments.fitting.published import HEROES, TIMES, free_of, kind_of, truth_of
 from experiments.fitting.scenes import STEPS, moved, tracks
+from experiments.lines import Cases, Line, markdown
 from jaxphys.fitting import Free, Uncertainty, layout, problem, solved
 
 SCENES, CELLS, SEEDS = ("torus", "droplet", "trophy"), 10, 20

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 import jaxphys
-from experiments.fitting.lines import Cases, Line, markdown
 from experiments.fitting.published import TIMES
 from experiments.fitting.scenes import fitted, moved, scene_of, solid, tracks
+from experiments.lines import Cases, Line, markdown
 from jaxphys.fitting import LBFGS, Field, Log
 
 SOFT, STIFF, START = 3e4, 3e5, 1e5

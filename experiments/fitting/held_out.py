@@ -11,9 +11,9 @@ from functools import partial
 import numpy as np
 
 import jaxphys
-from experiments.fitting.lines import Cases, Line, markdown
 from experiments.fitting.published import error_of, kind_of
 from experiments.fitting.scenes import SHAPES, fitted, moved, scene_of, solid, told, tracks
+from experiments.lines import Cases, Line, markdown
 from jaxphys.fitting import Free
 
 TIMES = np.arange(8) / 24

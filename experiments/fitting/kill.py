@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.fitting.lines import Cases, Line, markdown
 from experiments.fitting.scenes import moved, scene_of, solid
+from experiments.lines import Cases, Line, markdown
 from jaxphys.gaussians.ply import write_ply
 from jaxphys.scene.build import build
 from jaxphys.scene.json import to_json

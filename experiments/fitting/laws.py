@@ -10,8 +10,8 @@ from functools import partial
 import numpy as np
 
 import jaxphys
-from experiments.fitting.lines import Cases, Line, markdown
 from experiments.fitting.scenes import TRACK_NOISE, fitted, moved, scene_of, solid, tracks
+from experiments.lines import Cases, Line, markdown
 from jaxphys.fitting import Bounded, Free, Log, Tracks
 
 TIMES = np.arange(9) / 24

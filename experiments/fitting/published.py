@@ -13,8 +13,8 @@ from functools import partial
 import numpy as np
 
 import jaxphys
-from experiments.fitting.lines import Cases, Line, markdown
 from experiments.fitting.scenes import fitted, images, moved, scene_of, solid, told, tracks
+from experiments.lines import Cases, Line, markdown
 from jaxphys.fitting import Bounded, Free, Log
 
 TIMES = np.arange(8) / 24

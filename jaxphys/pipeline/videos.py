@@ -24,6 +24,7 @@ def write_videos(
     out: str | os.PathLike,
     *,
     title: str | None = None,
+    titles: Sequence[str] | None = None,
     megabytes: float = MEGABYTES,
     overwrite: bool = False,
     progress: bool = False,
@@ -34,37 +35,44 @@ def write_videos(
         directories: made by generate or animate, in the order of the page.
         out: the file.
         title: of the page.
+        titles: of the runs, in their order; None: what each was asked for.
         megabytes: most that the motion of each run may take on the page, in base64.
         overwrite: whether `out` may be replaced.
         progress: whether to show bars where a motion is computed again.
 
     Raises:
-        InputError: a directory is no finished run, or the file cannot be written.
+        InputError: a directory is no finished run, there is not one title for each, or the file
+        cannot be written.
         SimulationError: a motion failed this time.
     """
     check_number("--megabytes", megabytes, between(0.05, 400))
     paths = [Path(directory) for directory in directories]
     if not paths:
         raise InputError("DIR: name at least one directory that generate or animate made")
+    if titles is not None and len(titles) != len(paths):
+        raise InputError(f"titles: {len(titles)} for {len(paths)} runs; give one for each")
     read = [path / name for path in paths for name in (*NEEDED, "evaluation.json", "prompt.json")]
     target = output_file(out, overwrite=overwrite, inputs=tuple(read))
     for path in paths:
         require_finished(path)
-    entries = [_entry(path, int(1e6 * megabytes), progress) for path in paths]
+    entries = [
+        _entry(path, None if titles is None else titles[i], int(1e6 * megabytes), progress)
+        for i, path in enumerate(paths)
+    ]
     page = videos_page(entries, TITLE if title is None else title)
     with atomic_path(target) as aside:
         aside.write_text(page, encoding="utf-8")
     return target
 
 
-def _entry(directory: Path, largest: int, progress: bool) -> Entry:
+def _entry(directory: Path, title: str | None, largest: int, progress: bool) -> Entry:
     again = replay(directory, progress=progress)
     with reading(directory / "motion.mp4", LARGEST_FILM) as path:
         film = path.read_bytes()
     facts = facts_of(again.scene, _object(directory / "prompt.json"))
     facts |= scores(_object(directory / "evaluation.json"))
     return Entry(
-        title=title_of(again.scene, directory.resolve().name),
+        title=title_of(again.scene, directory.resolve().name) if title is None else title,
         facts=facts,
         film=film,
         motion=pack(again.moving, largest),

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from experiments.fitting import coverage, held_out, kill, laws, lines, published
+from experiments import lines
+from experiments.fitting import coverage, held_out, kill, laws, published
 from experiments.fitting.__main__ import main
 from jaxphys.fitting import Uncertainty
 

@@ -15,6 +15,7 @@ from jaxphys.gaussians.ply import read_ply
 from jaxphys.page.motion_data import pack
 from jaxphys.pipeline.animate import animate
 from jaxphys.pipeline.replay import replay
+from jaxphys.pipeline.videos import write_videos
 from jaxphys.scene.scene import Generation
 from tests.page.moving import covariances, unpacked
 from tests.pipeline.test_animate import small_scene, sphere
@@ -129,6 +130,13 @@ def test_what_is_no_finished_run_is_refused_in_a_line(finished, tmp_path, capsys
     assert run(["page", f"{folder}", "--out", f"{out}", *options]) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert words in line and not out.exists()
+
+
+def test_runs_have_the_titles_that_are_given(finished, tmp_path):
+    with pytest.raises(InputError, match="titles: 2 for 1 runs"):
+        write_videos([finished], tmp_path / "page.html", titles=["one", "two"])
+    page = write_videos([finished], tmp_path / "page.html", titles=["A <title>"]).read_text()
+    assert "A &lt;title&gt;" in page and "of jelly</h2>" not in page
 
 
 def test_a_report_shows_the_run_and_names_no_place_or_time(finished):
