@@ -31,7 +31,7 @@ OBJECTS = {
     "cream": ("cupcake", 0),
     "toothpaste": ("egg", 0),
     "plasticine": ("teddy bear", 0),
-    "snow": ("snowman", 0),
+    "snow": ("ball", 0),
     "wet-sand": ("castle", 0),
     "memory-foam": ("cube", 0),
     "muscle": ("heart", 3),

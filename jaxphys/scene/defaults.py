@@ -8,7 +8,10 @@ that a second of motion takes some hundred steps on the coarse grid.
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from typing import Literal
+
+import numpy as np
 
 from jaxphys.mpm.boundaries import Capsule, Keyframes, Plane, Vector, Walls
 from jaxphys.mpm.materials.catalogue import get_material
@@ -25,6 +28,8 @@ FLOOR = 0.25
 INSET = 0.2
 # Turns a capsule so that it lies along the view of the usual camera (`View.azimuth`), -60 degrees.
 INTO_PICTURE = (0.70711, 0.61237, 0.35355, 0.0)
+# Packed snow that bears thirty times more than what is around it.
+LUMP = {"youngs_modulus": 1e6, "critical_stretch": 0.03, "critical_compression": 0.1}
 TANK = 0.6  # from the domain's sides to those of the glass tank that water is poured into
 
 
@@ -181,8 +186,49 @@ def _plasticine(domain: Domain) -> Scene:
 
 
 def _snow(domain: Domain) -> Scene:
-    # What has been packed is elastic: without damping it would hop on like rubber.
-    return _dropped("snow", domain, gap=0.2, speed=6.0, friction=0.8, damping=3.0)
+    size, rise, radius = 0.75, 0.25, 0.1
+    scene = _dropped("snow", domain, size=size, gap=rise + radius + 0.1, speed=3.0, friction=0.8)
+    # On a floor it is only packed. A log in its way pulls it apart, and what is harder than the
+    # snow around it comes off in lumps (Stomakhin et al. 2013 begin with uneven snow too); of even
+    # snow this large nothing holds its own weight, and all of it falls to powder.
+    (thing,) = scene.objects
+    lumps = tuple(
+        Region(_offset(thing.centre, place), (half, half, half), LUMP)
+        for place, half in _uneven(size)
+    )
+    log = Capsule(
+        centre=(MIDDLE, MIDDLE, FLOOR + rise),
+        orientation=INTO_PICTURE,
+        radius=radius,
+        half_height=0.6,
+        friction=0.3,
+    )
+    return replace(
+        scene,
+        objects=(replace(thing, regions=lumps, grain=0.25),),
+        boundaries=(*scene.boundaries, log),
+        frames=30,
+        obstacle_colour=(0.35, 0.23, 0.15),
+        # White snow shows on what is not white.
+        background=(0.5, 0.62, 0.78),
+        ground=Ground(FLOOR, colour=(0.4, 0.5, 0.62)),
+    )
+
+
+def _offset(centre: Vector, by: Vector) -> Vector:
+    return (centre[0] + by[0], centre[1] + by[1], centre[2] + by[2])
+
+
+def _uneven(size: float) -> list[tuple[Vector, float]]:
+    """Middles, from that of an object, and half sides of 27 cubes that lie a little out of order
+    through it, some two cells apart [m].
+    """
+    pitch, random = size / 3, np.random.default_rng(0)
+    found = []
+    for i, j, k in product((-1, 0, 1), repeat=3):
+        x, y, z = pitch * (np.array([i, j, k]) + random.uniform(-0.08, 0.08, 3))
+        found.append(((float(x), float(y), float(z)), float(pitch * random.uniform(0.3, 0.38))))
+    return found
 
 
 def _wet_sand(domain: Domain) -> Scene:

@@ -1,5 +1,6 @@
 import dataclasses
 from functools import partial
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from jaxphys.mpm.loop.frames import advance_frame
 from jaxphys.mpm.loop.status import check
 from jaxphys.mpm.materials.catalogue import MATERIALS
 from jaxphys.mpm.materials.fracture import FRACTURE, number_of_pieces
+from jaxphys.pipeline.frames import frames
 from jaxphys.scene import scene_from_json, to_json
 from jaxphys.scene.build import build
 from jaxphys.scene.defaults import SPACING, default_scene
@@ -50,28 +52,28 @@ def hollow_ball(count=600):
     return from_points(points.astype(np.float32), np.array([0.6, 0.6, 0.6]), size)
 
 
-def after(name, frames, spacing=0.1):
+def after(name, count, spacing=0.1):
     """Positions (N, 3) of a ball's particles in the material's scene, at the start and after some
     frames, and the fastest speed then.
     """
     simulation, _ = build(default_scene(name, spacing=spacing), hollow_ball())
-    end = run(simulation, frames)
+    end = run(simulation, count)
     speed = np.linalg.norm(np.asarray(end.velocity), axis=0)
     return np.asarray(simulation.state.position).T, np.asarray(end.position).T, speed.max()
 
 
-def ended(name, frames, spacing):
+def ended(name, count, spacing):
     """The solver's state after some frames."""
-    return run(build(default_scene(name, spacing=spacing), hollow_ball()).simulation, frames)
+    return run(build(default_scene(name, spacing=spacing), hollow_ball()).simulation, count)
 
 
-def run(simulation, frames):
+def run(simulation, count):
     end = advance_frame(
         simulation.config,
         simulation.model,
         simulation.state,
         simulation.dt,
-        frames * simulation.steps,
+        count * simulation.steps,
     )
     check(end.status)
     return end
@@ -125,7 +127,7 @@ def test_what_fractures_breaks_into_pieces():
     assert 0.05 < np.mean(damage >= 1) < 0.5
 
 
-def heights(name, *frames, spacing=0.1):
+def heights(name, *counts, spacing=0.1):
     """How high a ball in the material's scene reaches above the floor at its middle [m], at the
     start and after these numbers of frames.
     """
@@ -133,7 +135,7 @@ def heights(name, *frames, spacing=0.1):
     simulation, _ = build(scene, hollow_ball())
     start = np.asarray(simulation.state.position).T
     middle = np.linalg.norm(start[:, :2] - scene.objects[0].centre[:2], axis=1) < 0.1
-    ends = (np.asarray(run(simulation, count).position).T for count in frames)
+    ends = (np.asarray(run(simulation, count).position).T for count in counts)
     return [at[middle, 2].max() - scene.ground.height for at in (start, *ends)]
 
 
@@ -149,3 +151,33 @@ def test_muscle_shortens_and_lengthens_again():
     start, short, long = heights("muscle", 10, 19)
     assert short < 0.85 * start
     assert long > short + 0.1 * start
+
+
+def test_snow_crumbles_on_a_log_and_is_packed_by_a_floor():
+    """What lies loose has grown by half for good: most of it where the scene's log pulls it apart,
+    on both sides, and next to nothing without the log. What is packed has lost a tenth.
+
+    Of even snow: on this grid the scene's lumps are too near each other to part.
+    """
+    scene = default_scene("snow", spacing=0.1)
+    simulation, _ = build(scene.filmed(), hollow_ball())
+    numbers = MATERIALS["snow"].defaults
+    even = simulation.with_(
+        **{name: numbers[name] for name in scene.objects[0].regions[0].parameters}
+    )
+    log = len(scene.boundaries) - 1
+
+    def fallen(simulation):
+        *_, moment = islice(frames(simulation), 9)
+        check(moment.state.status)
+        across = np.asarray(moment.state.position).T - scene.boundaries[log].centre
+        right = np.array([np.sin(np.pi / 3), 0.5, 0.0])  # of the picture, seen from -60 degrees
+        return np.exp(np.asarray(moment.state.history[0])), across @ right
+
+    volume, across = fallen(even)
+    loose = volume > 1.5
+    assert np.mean(loose) > 0.5
+    assert min(np.mean(across[loose] > 0.1), np.mean(across[loose] < -0.1)) > 0.3
+    volume, _ = fallen(even.with_(boundaries={log: {"centre": (0.3, 0.3, 2.2)}}))
+    assert np.mean(volume > 1.5) < 0.05
+    assert np.mean(volume < 0.9) > 0.3
