@@ -185,7 +185,7 @@ def table(lines: list[Line]) -> str:
             theirs = error_of(name, hero.theirs[name], hero.true[name])
             rows.append((*head, f"`{name}`", _number(hero.true[name]), _number(hero.start[name]),
                          _number(line["found"][name]), interval,
-                         f"{error:+.3f}", f"{theirs:+.3f}"))  # fmt: skip
+                         f"{error:+.4f}", f"{theirs:+.3f}"))  # fmt: skip
     head = ("scene", "seen", "number", "true", "start", "found", "90% interval", "error",
             "PAC-NeRF's error, its data")  # fmt: skip
     return markdown(head, rows) + "\n\n" + _costs(lines)
