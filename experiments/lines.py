@@ -8,8 +8,6 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import jax
-
 from benchmarks.worker import machine
 from jaxphys.core.errors import InputError
 
@@ -46,7 +44,6 @@ def run(cases: Cases, path: Path) -> None:
         with path.open("a") as out:
             out.write(json.dumps(line) + "\n")
         print(json.dumps(line), flush=True)
-        jax.clear_caches()
 
 
 def markdown(head: tuple[str, ...], rows: list[tuple]) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from experiments.lines import read, run
 
-NAMES = ("published", "coverage", "field", "laws", "held_out", "kill")
+NAMES = ("published", "coverage", "field", "laws", "held_out", "kill", "guided")
 
 
 def main(arguments: list[str] | None = None) -> None:

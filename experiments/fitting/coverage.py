@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
-from experiments.fitting.published import HEROES, TIMES, free_of, kind_of, truth_of
-from experiments.fitting.scenes import STEPS, moved, tracks
+from experiments.fitting.published import HEROES, TIMES, built, free_of, kind_of, truth_of
+from experiments.fitting.scenes import asked_of, fitted, moved, tracks
 from experiments.lines import Cases, Line, markdown
-from jaxphys.fitting import Free, Uncertainty, layout, problem, solved
+from jaxphys.fitting import Free, Uncertainty
 
 SCENES, CELLS, SEEDS = ("torus", "droplet", "trophy"), 10, 20
 OFF = 2.0  # times the true value, or a tenth less of what is bounded
@@ -24,20 +24,20 @@ def held(sure: Uncertainty, true: dict[str, float]) -> dict[str, bool]:
 def case(name: str, seeds: int, cells: int, times: np.ndarray) -> Line:
     """All seeds of a scene."""
     hero = HEROES[name]
-    simulation, _, true = truth_of(hero, cells)
-    motion = moved(true, times)
+    simulation, _ = built(hero, cells)
     starts = {
         key: 0.9 * value if "ratio" in key or "angle" in key else value / OFF
         for key, value in hero.true.items()
     }
     free: dict[str, Free] = {key: kind_of(key, value) for key, value in starts.items()}
     free |= {"velocity": free_of(hero)["velocity"]}
-    asked = problem(simulation, layout(free, simulation, None), (tracks(motion, 0),), steps=STEPS)
+    asked = asked_of(simulation, free, times)
+    motion = moved(asked, truth_of(hero))
     wanted = {key: value for key, value in hero.true.items()}
     wanted |= {f"velocity.{a}": v for a, v in zip("xyz", hero.velocity, strict=True)}
     rows = []
     for seed in range(seeds):
-        fit = solved(asked.observing((tracks(motion, seed),)))
+        fit, _ = fitted(asked, tracks(motion, asked.times, seed))
         sure = fit.uncertainty
         rows.append(
             {

@@ -8,13 +8,14 @@ A block falls; nobody says where it is stiff. `draw` makes the picture of truth,
 from functools import partial
 from pathlib import Path
 
+import jax
 import numpy as np
 
 import jaxphys
 from experiments.fitting.published import TIMES
-from experiments.fitting.scenes import fitted, moved, scene_of, solid, tracks
+from experiments.fitting.scenes import STEPS, asked_of, fitted, scene_of, solid, tracks
 from experiments.lines import Cases, Line, markdown
-from jaxphys.fitting import LBFGS, Field, Log
+from jaxphys.fitting import LBFGS, Field, Log, motion_at
 
 SOFT, STIFF, START = 3e4, 3e5, 1e5
 NODES = (5, 2, 2)
@@ -28,9 +29,12 @@ def case(cells: int, times: np.ndarray) -> Line:
     rest = np.asarray(simulation.frame(simulation.state).position, np.float64)
     middle = 0.5 * (rest[:, 0].min() + rest[:, 0].max())
     true = np.where(rest[:, 0] < middle, SOFT, STIFF)
-    seen = tracks(moved(simulation.with_(youngs_modulus=true), times), 1)
     free = {"youngs_modulus": Field(Log(START), nodes=NODES)}
-    fit, evaluations = fitted(simulation, free, seen, search=LBFGS(iterations=40))
+    asked = asked_of(simulation, free, times)
+    run = jax.jit(partial(motion_at, times=asked.times, steps=STEPS))
+    motion = jax.device_get(run(simulation.with_(youngs_modulus=true))).check()
+    seen = tracks(motion, asked.times, 1)
+    fit, evaluations = fitted(asked, seen, search=LBFGS(iterations=40))
     entry_nodes = free["youngs_modulus"].weights(rest)
     line = np.log10(np.asarray(fit.values["youngs_modulus"]))
     found = np.sum(line[entry_nodes[0]] * entry_nodes[1], axis=0)

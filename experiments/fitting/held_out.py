@@ -12,7 +12,16 @@ import numpy as np
 
 import jaxphys
 from experiments.fitting.published import error_of, kind_of
-from experiments.fitting.scenes import SHAPES, fitted, moved, scene_of, solid, told, tracks
+from experiments.fitting.scenes import (
+    SHAPES,
+    asked_of,
+    fitted,
+    moved,
+    scene_of,
+    solid,
+    told,
+    tracks,
+)
 from experiments.lines import Cases, Line, markdown
 from jaxphys.fitting import Free
 
@@ -78,10 +87,11 @@ def case(what: Drawn, cells: int, times: np.ndarray) -> Line:
     material, law, _, starts = MATERIALS[what.law]
     scene = scene_of(material, {"density": 1000.0}, law=law, floor=what.floor)
     simulation, _ = jaxphys.build(scene, solid(what.shape, cells))
-    motion = moved(simulation.with_(**what.true, velocity=what.velocity), times)
     free: dict[str, Free] = {name: kind_of(name, value) for name, value in starts.items()}
     free["velocity"] = Free((0.0, 0.0, -1.0), size=1.0)
-    fit, evaluations = fitted(simulation, free, tracks(motion, SEED))
+    asked = asked_of(simulation, free, times)
+    motion = moved(asked, {**what.true, "velocity": what.velocity})
+    fit, evaluations = fitted(asked, tracks(motion, asked.times, SEED))
     line = {
         **asdict(what),
         **told(fit),

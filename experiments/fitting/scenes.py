@@ -7,16 +7,29 @@ Gaussians, each of which is a particle.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import jax
 import numpy as np
 
 import jaxphys
-from jaxphys.fitting import Fit, Free, Images, Observed, Tracks, motion_at
-from jaxphys.fitting.free import Field
+from jaxphys.fitting import (
+    Field,
+    Fit,
+    Free,
+    Images,
+    Observed,
+    Problem,
+    Tracks,
+    layout,
+    problem,
+    solved,
+    still,
+)
 from jaxphys.gaussians import Gaussians, from_points
 from jaxphys.mpm.motion import Motion
 from jaxphys.mpm.simulation import Simulation
+from jaxphys.render import Camera
 from jaxphys.scene import Domain, Object, Plane, Scene
 from jaxphys.scene.look import Look
 
@@ -123,40 +136,65 @@ def scene_of(
     )
 
 
-def moved(simulation: Simulation, times: Sequence[float], steps: int = STEPS) -> Motion:
-    """The motion at times."""
+def asked_of(
+    simulation: Simulation,
+    free: Mapping[str, Free | Field],
+    times: Sequence[float],
+    *,
+    look: Look | None = None,
+    views: int = 0,
+) -> Problem:
+    """What is asked of a scene, with nothing moving seen in it yet: its programs make what is seen
+    (`moved`), and fit it (`Problem.observing`). Tracks, or pictures of so many views.
+    """
     times = tuple(float(t) for t in times)
-    run = jax.jit(partial(motion_at, times=times, steps=steps))
-    return jax.device_get(run(simulation)).check()
+    blank = np.full((views, len(times), PIXELS, PIXELS, 3), 1.0)
+    seen = (
+        Images(blank, cameras(views), np.array(times), noise=PIXEL_NOISE)
+        if views
+        else tracks(still(simulation, times), times, 0)
+    )
+    numbers = layout(free, simulation, look)
+    return problem(simulation, numbers, (seen,), look=look, steps=STEPS)
 
 
-def tracks(motion: Motion, seed: int) -> Tracks:
+def moved(asked: Problem, true: Mapping[str, Any]) -> Motion:
+    """The motion with the true numbers."""
+    vector = asked.layout.vector(true)
+    run = asked.call("motion", asked.program(vector))
+    return jax.device_get(run(asked.cast(vector), len(asked.times))[0]).check()
+
+
+def tracks(motion: Motion, times: Sequence[float], seed: int) -> Tracks:
     """Where all particles were, with noise."""
     random = np.random.default_rng(seed)
     places = np.asarray(motion.position, np.float64)
     noisy = places + TRACK_NOISE * random.normal(size=places.shape)
-    return Tracks(noisy, np.asarray(motion.time, np.float64), noise=TRACK_NOISE)
+    return Tracks(noisy, np.asarray(times, np.float64), noise=TRACK_NOISE)
 
 
-def images(motion: Motion, look: Look, views: int, seed: int) -> Images:
-    """What cameras around it saw, with noise."""
-    random = np.random.default_rng(seed)
-    cameras = [
+def cameras(views: int) -> list[Camera]:
+    """Around it."""
+    return [
         jaxphys.orbit(
             (SIDE / 2, SIDE / 2, 0.45), 2.2, 0.4 + 2 * np.pi * k / views, 0.3,
             width=PIXELS, height=PIXELS,
         )
         for k in range(views)
     ]  # fmt: skip
-    options = {"background": 1.0, "capacity": CAPACITY}
+
+
+def images(motion: Motion, times: Sequence[float], look: Look, views: int, seed: int) -> Images:
+    """What cameras around it saw, with noise."""
+    random = np.random.default_rng(seed)
+    draw = jax.jit(partial(jaxphys.draw, background=1.0, capacity=CAPACITY))
     seen = [
-        [np.asarray(jaxphys.draw(look, motion[t], camera, **options).colour)
-         for t in range(len(motion))]
-        for camera in cameras
-    ]  # fmt: skip
+        [np.asarray(draw(look, motion[t], camera).colour) for t in range(len(motion))]
+        for camera in cameras(views)
+    ]
     noisy = np.asarray(seen) + PIXEL_NOISE * random.normal(size=np.shape(seen))
-    times = np.asarray(motion.time, np.float64)
-    return Images(np.clip(noisy, 0, 1), cameras, times, noise=PIXEL_NOISE)
+    times = np.asarray(times, np.float64)
+    return Images(np.clip(noisy, 0, 1), cameras(views), times, noise=PIXEL_NOISE)
 
 
 @dataclass
@@ -169,13 +207,10 @@ class Counter:
         self.count += 1
 
 
-def fitted(
-    simulation: Simulation, free: Mapping[str, Free | Field], observed: Observed, **options
-) -> tuple[Fit, int]:
-    """A fit, and how many evaluations it took."""
+def fitted(asked: Problem, observed: Observed, **options) -> tuple[Fit, int]:
+    """A fit to what was observed, and how many evaluations it took."""
     counter = Counter()
-    fit = jaxphys.fit(simulation, free, observed, watch=counter, steps=STEPS, **options)
-    return fit, counter.count
+    return solved(asked.observing((observed,)), watch=counter, **options), counter.count
 
 
 def told(fit: Fit) -> dict:

@@ -13,6 +13,7 @@ from .free import Log as Log
 from .free import Softplus as Softplus
 from .layout import layout as layout
 from .motion import motion_at as motion_at
+from .motion import still as still
 from .observed import Images as Images
 from .observed import Masks as Masks
 from .observed import Observed as Observed

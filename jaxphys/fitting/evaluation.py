@@ -78,7 +78,7 @@ class Memory:
 class Evaluator:
     """A problem's loss and its derivatives at vectors, for a search on the host.
 
-    A program is compiled once for each number of steps of its ladder.
+    Programs are compiled once; that of a reverse derivative once for each number of steps.
 
     Args:
         problem: what is evaluated.
@@ -158,9 +158,11 @@ class Evaluator:
                 raise  # where the fit starts
             return failed
         while True:
-            function = self.problem.call(kind, program)
-            found = jax.device_get(function(self.problem.cast(vector), data, frames))
-            parts = (found,) if kind == "loss" else found
+            if kind == "loss":
+                parts = (self.problem.compare(vector, data, frames, program).loss,)
+            else:
+                function = self.problem.call(kind, program)
+                parts = jax.device_get(function(self.problem.cast(vector), data, frames))
             if np.isfinite(parts[0]):
                 names = ("loss", "slope", "gram")
                 return {n: np.asarray(p, np.float64) for n, p in zip(names, parts, strict=False)}

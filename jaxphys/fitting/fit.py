@@ -11,10 +11,10 @@ from jaxphys.core.errors import InputError
 from jaxphys.fitting.evaluation import Evaluator, Memory
 from jaxphys.fitting.free import Field, Free
 from jaxphys.fitting.layout import STATE, Layout, layout
-from jaxphys.fitting.motion import CHECKPOINTED
+from jaxphys.fitting.motion import CHECKPOINTED, still
 from jaxphys.fitting.observed.base import Observed
 from jaxphys.fitting.observed.pictures import Seen
-from jaxphys.fitting.problem import Problem, Program, problem
+from jaxphys.fitting.problem import Problem, problem
 from jaxphys.fitting.result import SHOWN, Fit, Misfit
 from jaxphys.fitting.search import FAILED, Search, Step, chosen
 from jaxphys.fitting.uncertainty import Uncertainty, independent_residuals, laplace
@@ -248,26 +248,31 @@ def _row(stage: int, step: Step, numbers: Layout) -> dict:
 
 def _ended(ask, begun, vector, history, search: str, reason: str, level: float) -> Fit:
     asked, numbers = ask.problem, ask.problem.layout
-    program = ask.program(vector)
+    program, count = ask.program(vector), len(asked.times)
     data = asked.matched(vector, asked.data(), program)
-    motion, residuals = _seen(asked, vector, data, program)
-    if np.any(np.asarray(motion.status.code) != OK):
-        check(motion[int(np.argmax(np.asarray(motion.status.code) != OK))].status)
+    end = asked.compare(vector, data, count, program)
+    if np.any(end.motion.status.code != OK):
+        check(end.motion[int(np.argmax(end.motion.status.code != OK))].status)
     before = ask.program(begun)
-    _, at_start = _seen(asked, begun, asked.matched(begun, asked.data(), before), before)
+    at_start = asked.compare(begun, asked.matched(begun, asked.data(), before), count, before)
+    unmoved = still(asked.simulation, asked.times)
+    own = asked.matched_to(unmoved, end.look, asked.data())
+    compared = asked.call("compared", program)
+    at_rest, _ = jax.device_get(compared(unmoved, end.look, asked.cast(vector), own, count))
     simulation, look = asked.changed(asked.cast(vector))
     uncertainty = None
     if asked.squares and numbers.size <= MOST_INTERVALS:
-        uncertainty = _how_sure(asked, vector, data, program, residuals, level)
+        uncertainty = _how_sure(asked, vector, data, program, end.residuals, level)
     values = {
         name: float(value) if np.ndim(value) == 0 else np.asarray(value, np.float64)
         for name, value in numbers.values(vector).items()
     }
     misfits = tuple(
-        _misfit(asked, one, now, then, program, look)
-        for one, now, then in zip(asked.observed, residuals, at_start, strict=False)
+        _misfit(one, asked.simulation, *parts)
+        for one, *parts in zip(
+            asked.observed, end.residuals, at_start.residuals, at_rest, strict=False
+        )
     )
-    loss = 0.5 * sum(float(np.sum(np.square(r, dtype=np.float64))) for r in residuals)
     if reason == "":
         reason = "stopped at the number of iterations that was allowed"
     return Fit(
@@ -277,20 +282,12 @@ def _ended(ask, begun, vector, history, search: str, reason: str, level: float) 
         history=tuple(history),
         simulation=simulation,
         look=look,
-        motion=motion,
+        motion=end.motion,
         search=search,
         reason=reason if history else FAILED,
-        loss=loss,
+        loss=float(end.loss),
         vector=vector,
     )
-
-
-def _seen(asked: Problem, vector, data, program: Program):
-    """The motion at a vector and its residuals, on the host."""
-    count = len(asked.times)
-    motion, _ = asked.call("motion", program)(asked.cast(vector), count)
-    residuals = asked.call("residuals", program)(asked.cast(vector), data, count)
-    return jax.device_get(motion), [np.asarray(part) for part in jax.device_get(residuals)]
 
 
 def _how_sure(asked, vector, data, program, residuals, level) -> Uncertainty | None:
@@ -314,14 +311,8 @@ def _how_sure(asked, vector, data, program, residuals, level) -> Uncertainty | N
     )
 
 
-def _misfit(asked: Problem, one: Observed, now, then, program: Program, look) -> Misfit:
-    noise = one.noise_of(asked.simulation)
-    simulation = asked.simulation
-    still = one.still(simulation.frame(simulation.state), len(one.times))
-    data = one.matched(still, look, one.data(simulation, look))
-    at = asked.observed.index(one)
-    keywords = {"capacity": program.capacities[at]} if isinstance(one, Seen) else {}
-    unmoved = np.asarray(one.residuals(still, look, data, **keywords))
+def _misfit(one: Observed, simulation: Simulation, now, then, unmoved) -> Misfit:
+    noise = one.noise_of(simulation)
 
     def rms(residuals: np.ndarray) -> float:
         power = np.sum(np.square(residuals, dtype=np.float64))

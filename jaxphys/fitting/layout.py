@@ -85,10 +85,14 @@ class Layout:
 
     def start(self) -> np.ndarray:
         """Where the search begins, on the line, float64 (size,)."""
+        return self.vector({entry.name: entry.kind.start for entry in self.entries})
+
+    def vector(self, values: Mapping[str, Any]) -> np.ndarray:
+        """Values by name, in the user's units, as places on the line, float64 (size,)."""
         return np.concatenate(
             [
                 np.broadcast_to(
-                    np.asarray(entry.kind.to_line(np.asarray(entry.kind.start, np.float64))),
+                    np.asarray(entry.kind.to_line(np.asarray(values[entry.name], np.float64))),
                     entry.shape,
                 ).ravel()
                 for entry in self.entries

@@ -6,7 +6,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.loop.adjoint import Adjoint, Checkpointed, for_frames
+from jaxphys.mpm.loop.adjoint import Adjoint, Checkpointed, Plain, for_frames
 from jaxphys.mpm.loop.rollout import rollout
 from jaxphys.mpm.motion import Motion
 from jaxphys.mpm.simulation import Simulation
@@ -16,7 +16,9 @@ from jaxphys.mpm.stepping.fixed import SAFETY
 
 CHECKPOINTED = Checkpointed()
 MOST_STEPS = 100_000  # between two of the times
-RUNGS_PER_DOUBLING = 2  # of the numbers of steps that programs are compiled for
+RUNGS_PER_DOUBLING = (
+    2  # of the numbers of steps, for each of which a reverse derivative is compiled
+)
 
 
 class TooManySteps(InputError):
@@ -25,7 +27,7 @@ class TooManySteps(InputError):
 
 def steps_for(simulation: Simulation, longest: float) -> int:
     """How many steps an interval of `longest` [s] takes at the simulation's present numbers, the
-    next of a ladder of numbers, so that few programs are compiled. On the host.
+    next of a ladder of numbers: a reverse derivative is compiled for each. On the host.
 
     Raises:
         TooManySteps: more than `MOST_STEPS`.
@@ -44,7 +46,7 @@ def steps_for(simulation: Simulation, longest: float) -> int:
 def motion_at(
     simulation: Simulation,
     times: tuple[float, ...],
-    steps: int,
+    steps: Array | int,
     adjoint: Adjoint = CHECKPOINTED,
     horizon: Array | int | None = None,
 ) -> Motion:
@@ -53,7 +55,8 @@ def motion_at(
     Args:
         simulation: whose time step is not asked.
         times: T of them [s], from 0 on, increasing. Static.
-        steps: between two of them. Static.
+        steps: between two of them. May be traced, so that one program serves any number of them;
+            then there is no reverse mode, and `adjoint` is not asked.
         adjoint: how a gradient goes back.
         horizon: so many of the times are computed, which may be traced; the others repeat the last.
     """
@@ -65,7 +68,10 @@ def motion_at(
         return frame.position, frame.deformation, frame.time, frame.status
 
     first = 1 if times[0] == 0 else 0
-    inner, again = for_frames(adjoint, max(len(times) - first, 1), steps)
+    inner: Adjoint = Plain()
+    again = 0
+    if isinstance(steps, int):
+        inner, again = for_frames(adjoint, max(len(times) - first, 1), steps)
 
     def advance(state, dt):
         return rollout(
@@ -91,6 +97,18 @@ def motion_at(
         lambda *parts: jnp.concatenate(parts), *moments
     )
     return Motion(position, deformation, time, status, simulation.carriers)
+
+
+def still(simulation: Simulation, times: tuple[float, ...]) -> Motion:
+    """A motion in which nothing moves, at `times` [s]: what a fit must beat."""
+    frame = simulation.frame(simulation.state)
+    position, deformation, status = jax.tree.map(
+        lambda x: jnp.repeat(x[None], len(times), axis=0),
+        (frame.position, frame.deformation, frame.status),
+    )
+    return Motion(
+        position, deformation, jnp.asarray(times, position.dtype), status, simulation.carriers
+    )
 
 
 def some(motion: Motion, which: np.ndarray) -> Motion:

@@ -9,7 +9,7 @@ to another search.
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,7 +31,7 @@ from jaxphys.scene.look import Look
 
 @dataclass(frozen=True)
 class Program:
-    """What decides which program is compiled.
+    """How the motion of some numbers is computed and drawn.
 
     Attributes:
         steps: between two of the times.
@@ -40,6 +40,17 @@ class Program:
 
     steps: int
     capacities: tuple[int, ...]
+
+
+class Comparison(NamedTuple):
+    """What a vector gives: the motion at the times, what is drawn of it, the residuals of each
+    observation and field, and the loss that these are.
+    """
+
+    motion: Motion
+    look: Look | None
+    residuals: list[Array]
+    loss: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +120,12 @@ class Problem:
         each field.
         """
         motion, look = self.motion(vector, horizon, program)
+        return self.residuals_of(motion, look, vector, data, horizon, program)
+
+    def residuals_of(
+        self, motion: Motion, look: Look | None, vector: Array, data, horizon, program: Program
+    ) -> list[Array]:
+        """The residuals of a motion at the times."""
         found = []
         for one, own, capacity in zip(self.observed, data, program.capacities, strict=True):
             which = self.frames_of(one)
@@ -127,8 +144,12 @@ class Problem:
         """Half the sum of the squares of the residuals, and losses of one's own, (). NaN where the
         simulation fails.
         """
+        return self.loss_of(self.residuals(vector, data, horizon, program))
+
+    def loss_of(self, residuals: list[Array]) -> Array:
+        """The loss that residuals are, ()."""
         total = jnp.zeros((), self.simulation.model.mass.dtype)
-        for i, part in enumerate(self.residuals(vector, data, horizon, program)):
+        for i, part in enumerate(residuals):
             one = self.observed[i] if i < len(self.observed) else None
             is_loss = isinstance(one, Own) and one.is_loss
             total = total + (jnp.sum(part) if is_loss else 0.5 * jnp.sum(part**2))
@@ -168,21 +189,46 @@ class Problem:
         """A vector in the simulation's dtype."""
         return jnp.asarray(vector, self.simulation.model.mass.dtype)
 
-    def call(self, name: str, program: Program):
-        """A compiled function of (vector, data, horizon): "residuals", "loss", "gradient" or
-        "normal"; or of (vector, horizon): "motion".
+    def compare(self, vector, data: tuple, horizon: int, program: Program) -> Comparison:
+        """What a vector gives, on the host. The motion's program serves any number of steps and
+        any room for drawing, and that which compares any motion.
         """
-        key = name, program
-        if key not in self._compiled:
-            functions: dict[str, Callable] = {
-                "motion": partial(self.motion, program=program),
-                "residuals": partial(self.residuals, program=program),
-                "loss": partial(self.loss, program=program),
-                "gradient": jax.value_and_grad(partial(self.loss, program=program)),
-                "normal": partial(self.normal, program=program),
-            }
-            self._compiled[key] = jax.jit(functions[name])
-        return self._compiled[key]
+        vector = self.cast(vector)
+        motion, look = self.call("motion", program)(vector, horizon)
+        residuals, loss = self.call("compared", program)(motion, look, vector, data, horizon)
+        return jax.device_get(Comparison(motion, look, residuals, loss))
+
+    def call(self, name: str, program: Program):
+        """A compiled function: "gradient" or "normal" of (vector, data, horizon); "motion" of
+        (vector, horizon); "compared" of (motion, look, vector, data, horizon): residuals and loss.
+
+        Reverse mode is compiled for a number of steps, all else for any.
+        """
+        room = program.capacities
+        fixed = {"gradient": program, "motion": (), "compared": room, "normal": room}[name]
+        if (name, fixed) not in self._compiled:
+            self._compiled[name, fixed] = self._made(name, program)
+        compiled = self._compiled[name, fixed]
+        return compiled if name == "gradient" else partial(compiled, program.steps)
+
+    def _made(self, name: str, program: Program) -> Callable:
+        if name == "gradient":
+            return jax.jit(jax.value_and_grad(partial(self.loss, program=program)))
+        functions: dict[str, Callable] = {
+            "motion": self.motion,
+            "compared": self._compared,
+            "normal": self.normal,
+        }
+        function = functions[name]
+
+        def of_any_steps(steps, *given):
+            return function(*given, program=Program(steps, program.capacities))
+
+        return jax.jit(of_any_steps)
+
+    def _compared(self, motion, look, vector, data, horizon, program: Program):
+        residuals = self.residuals_of(motion, look, vector, data, horizon, program)
+        return residuals, self.loss_of(residuals)
 
     def normal(self, vector: Array, data: tuple, horizon, program: Program):
         """(loss, J^T r (P,), J^T J (P, P)) of the residuals r and their derivatives J, by forward
@@ -210,7 +256,10 @@ class Problem:
         if all(type(one).matched is Observed.matched for one in self.observed):
             return data
         motion, look = self.call("motion", program)(self.cast(vector), len(self.times))
-        motion = jax.device_get(motion)
+        return self.matched_to(jax.device_get(motion), look, data)
+
+    def matched_to(self, motion: Motion, look: Look | None, data: tuple) -> tuple:
+        """`data` with neighbours found again for a motion at the times, if that is sound."""
         if np.any(motion.status.code != OK):
             return data
         return tuple(

@@ -9,13 +9,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError
-from jaxphys.mpm.motion import Frame, Motion
+from jaxphys.mpm.motion import Motion
 from jaxphys.mpm.simulation import Simulation
 from jaxphys.scene.look import Look
 
@@ -103,15 +101,6 @@ class Observed(ABC):
         again for a motion. On the host.
         """
         return data
-
-    def still(self, frame: Frame, count: int) -> Motion:
-        """A motion of `count` frames in which nothing moves: what a fit must beat."""
-
-        def repeated(x):
-            return jnp.repeat(jnp.asarray(x)[None], count, axis=0)
-
-        moved = jax.tree.map(repeated, (frame.position, frame.deformation, frame.status))
-        return Motion(moved[0], moved[1], jnp.asarray(self.times), moved[2], frame.carriers)
 
 
 def _first(wrong: np.ndarray) -> int:
