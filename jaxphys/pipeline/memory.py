@@ -40,13 +40,13 @@ def expected(scene: Scene, built: Built) -> dict[str, int]:
     placement, transfer = config.placement, config.transfer
     row, stencil = 4 * config.columns, transfer.spline.width**3
     chunk = max(into.size for into in cuts(config.runs, placement))
-    window = windowed(config, simulation.state).computed.nodes
+    rows = windowed(config, simulation.state).rows
     arrays = jax.tree.leaves((simulation.state, simulation.model))
     drawn = look.gaussians.count
     return {
         "program": PROGRAM,
         "state and parameters": STATES * sum(leaf.nbytes for leaf in arrays),
-        "grid": NODES * row * window * placement.devices,
+        "grid": NODES * row * rows * placement.devices,
         "transfers": stencil * row * placement.devices * chunk,
         "motion": CARRIED * drawn * scene.frames,
         "splats": SPLAT * drawn * drawn_at_once(scene.frames),

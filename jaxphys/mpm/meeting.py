@@ -1,0 +1,110 @@
+"""Contact between objects, each of which has a velocity field of its own on the grid.
+
+Objects that share a field are one continuum wherever they share a node: they stick to each other
+and resist being pulled apart. With a field each they know nothing of each other, and what is to
+happen between them is said here, node by node (Bardenhagen, Brackbill and Sulsky 2000): two that
+approach are brought to a common velocity along the normal, as much of their sliding is taken away
+as Coulomb's law allows, and two that part are left alone. It is an impulse between equals: what one
+gains the other loses, at the same node, so that momentum and angular momentum stay.
+
+With several at one node, pairs come one after the other. In order that momentum stays, the normal
+must be the same for both: that of the surface on which their masses have one ratio, grad log m_b -
+grad log m_a. It does not depend on which of them is denser, and what bounds both alike, such as the
+side of a stack, has no part in it.
+
+A kernel reaches further than matter does, so that two objects share nodes while they are still two
+cells apart. They touch where a node is full: what each has there, as a share of what it has a cell
+further inside along the normal, adds up to `TOUCH`. That asks for no density, and holds of shells
+that are thinner than a cell, and of matter that has been loosened, as well.
+"""
+
+from dataclasses import dataclass, field
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from jaxphys.core.fields import NON_NEGATIVE, Checked
+from jaxphys.mpm.boundaries.contact import shortened
+
+TOUCH = 0.9
+
+
+@dataclass(frozen=True)
+class Meeting(Checked):
+    """What happens where objects of a scene meet.
+
+    Attributes:
+        friction: Coulomb's coefficient between all of them, without a unit; 0 lets them slide.
+    """
+
+    friction: float = field(default=0.0, metadata=NON_NEGATIVE)
+
+
+def meet(mass: Array, velocity: Array, lightest: Array, friction: Array | None) -> Array:
+    """Velocities (3, K, nx, ny, nz) [m/s] of K objects' fields after contact between them.
+
+    Args:
+        mass: of the nodes (K, nx, ny, nz) [kg]; velocity: before, as what is returned.
+        lightest: [kg] () nodes with no more of an object have none of it.
+        friction: Coulomb's coefficient (), or None for none.
+    """
+    there = mass > lightest
+    inverse = jnp.where(there, 1 / jnp.where(there, mass, 1), 0)
+    before, after = jnp.stack([jnp.stack(_beside(mass, axis)) for axis in (1, 2, 3)], axis=1)
+    steepness = (after - before) * inverse  # grad log m
+    first, second = np.triu_indices(len(mass), 1)
+
+    def pair(velocity, which):
+        a, b = which
+        normal = _unit(steepness[:, b] - steepness[:, a])
+        inwards = normal > 0
+        full = _share(mass[a], normal, jnp.where(inwards, before[:, a], after[:, a]))
+        full = full + _share(mass[b], normal, jnp.where(inwards, after[:, b], before[:, b]))
+        touching = there[a] & there[b] & (full >= TOUCH)
+        lost = _lost(velocity[:, a] - velocity[:, b], normal, friction)
+        share = jnp.where(touching, 1 / jnp.where(touching, mass[a] + mass[b], 1), 0)
+        of_a, of_b = -mass[b] * share * lost, mass[a] * share * lost
+        return velocity.at[:, a].add(of_a).at[:, b].add(of_b), None
+
+    pairs = jnp.asarray(first, jnp.int32), jnp.asarray(second, jnp.int32)
+    return jax.lax.scan(pair, velocity, pairs)[0]
+
+
+def _lost(relative: Array, normal: Array, friction: Array | None) -> Array:
+    """What two touching objects lose of the velocity of the first one relative to the second one,
+    (3, ...) each; normal: from the first to the second.
+    """
+    along = jnp.sum(relative * normal, axis=0)
+    closing = jnp.maximum(along, 0)
+    lost = closing * normal
+    if friction is None:
+        return lost
+    return lost + shortened(relative - along * normal, friction * closing)
+
+
+def _share(mass: Array, normal: Array, inner: Array) -> Array:
+    """Mass over that a cell further inside along the normal, or 1 where that is less.
+
+    inner: (3, ...) the mass at the next node inwards on each axis.
+    """
+    deeper = jnp.maximum(mass, jnp.sum(normal**2 * inner, axis=0))
+    return mass / jnp.where(deeper > 0, deeper, 1)
+
+
+def _beside(nodes: Array, axis: int) -> tuple[Array, Array]:
+    """Values at the nodes before and after each along an axis; 0 beyond the ends."""
+    count = nodes.shape[axis]
+    padded = jnp.pad(nodes, [(1, 1) if a == axis else (0, 0) for a in range(nodes.ndim)])
+    before, after = (
+        jax.lax.slice_in_dim(padded, first, first + count, axis=axis) for first in (0, 2)
+    )
+    return before, after
+
+
+def _unit(vectors: Array) -> Array:
+    """(3, ...) of length 1; 0 where there is no direction."""
+    square = jnp.sum(vectors**2, axis=0)
+    there = square > 0
+    return vectors * jnp.where(there, jax.lax.rsqrt(jnp.where(there, square, 1)), 0)
