@@ -8,9 +8,9 @@ as Coulomb's law allows, and two that part are left alone. It is an impulse betw
 gains the other loses, at the same node, so that momentum and angular momentum stay.
 
 With several at one node, pairs come one after the other. In order that momentum stays, the normal
-must be the same for both: that of the surface on which their masses have one ratio, grad log m_b -
-grad log m_a. It does not depend on which of them is denser, and what bounds both alike, such as the
-side of a stack, has no part in it.
+must be the same for both: the gradient of the log of the ratio of what a node holds of either, each
+in units of its own fullest node. It does not depend on which of them is denser, and what bounds both
+alike, such as the side of a stack, has no part in it.
 
 A kernel reaches further than matter does, so that two objects share nodes while they are still two
 cells apart. They touch where a node is full: what each has there, as a share of what it has a cell
@@ -29,6 +29,9 @@ from jaxphys.core.fields import NON_NEGATIVE, Checked
 from jaxphys.mpm.boundaries.contact import shortened
 
 TOUCH = 0.9
+# Of both, beside what a node holds of either: with it the log of their ratio is in proportion to the
+# distance from the surface between them, to a tenth, wherever they share nodes.
+FLOOR = 0.01
 
 
 @dataclass(frozen=True)
@@ -51,14 +54,13 @@ def meet(mass: Array, velocity: Array, lightest: Array, friction: Array | None) 
         friction: Coulomb's coefficient (), or None for none.
     """
     there = mass > lightest
-    inverse = jnp.where(there, 1 / jnp.where(there, mass, 1), 0)
+    shares = mass / jnp.maximum(jnp.max(mass, axis=(1, 2, 3), keepdims=True), lightest)
     before, after = jnp.stack([jnp.stack(_beside(mass, axis)) for axis in (1, 2, 3)], axis=1)
-    steepness = (after - before) * inverse  # grad log m
     first, second = np.triu_indices(len(mass), 1)
 
     def pair(velocity, which):
         a, b = which
-        normal = _unit(steepness[:, b] - steepness[:, a])
+        normal = _normal(shares[a], shares[b])
         inwards = normal > 0
         full = _share(mass[a], normal, jnp.where(inwards, before[:, a], after[:, a]))
         full = full + _share(mass[b], normal, jnp.where(inwards, after[:, b], before[:, b]))
@@ -84,6 +86,29 @@ def _lost(relative: Array, normal: Array, friction: Array | None) -> Array:
     return lost + shortened(relative - along * normal, friction * closing)
 
 
+def _normal(first: Array, second: Array) -> Array:
+    """Unit normals (3, nx, ny, nz) from one object to another; 0 where there is no direction.
+
+    first, second: what the nodes hold of each, over what its fullest node holds.
+    """
+    both = first + second
+    there = both > 0
+    floor = FLOOR * jnp.where(there, both, 1)
+    distance = jnp.log((second + floor) / (first + floor))
+    slopes = []
+    for axis in (0, 1, 2):
+        # A node with neither of them tells nothing.
+        before, after = (
+            jnp.where(known, value, distance)
+            for value, known in zip(_beside(distance, axis), _beside(there, axis), strict=True)
+        )
+        slopes.append(after - before)
+    slope = jnp.stack(slopes)
+    square = jnp.sum(slope**2, axis=0)
+    steep = square > 0
+    return slope * jnp.where(steep, jax.lax.rsqrt(jnp.where(steep, square, 1)), 0)
+
+
 def _share(mass: Array, normal: Array, inner: Array) -> Array:
     """Mass over that a cell further inside along the normal, or 1 where that is less.
 
@@ -101,10 +126,3 @@ def _beside(nodes: Array, axis: int) -> tuple[Array, Array]:
         jax.lax.slice_in_dim(padded, first, first + count, axis=axis) for first in (0, 2)
     )
     return before, after
-
-
-def _unit(vectors: Array) -> Array:
-    """(3, ...) of length 1; 0 where there is no direction."""
-    square = jnp.sum(vectors**2, axis=0)
-    there = square > 0
-    return vectors * jnp.where(there, jax.lax.rsqrt(jnp.where(there, square, 1)), 0)

@@ -17,7 +17,7 @@ from jaxphys.mpm.loop.implicit.step import check_implicit
 from jaxphys.mpm.loop.placement import Placement, Slabs
 from jaxphys.mpm.loop.rollout import rollout
 from jaxphys.mpm.loop.window import windowed
-from jaxphys.mpm.meeting import TOUCH, meet
+from jaxphys.mpm.meeting import meet
 from jaxphys.mpm.state import OK
 from jaxphys.mpm.transfer.schemes import AFLIP, Transfer
 
@@ -31,16 +31,19 @@ X, Y, Z = np.eye(3)
 
 
 def halves(normal=X, offset=0.0, density=(1.0, 1.0), size=7, gap=0.0):
-    """Masses (2, n, n, n) of two half-spaces that touch at a plane, as a kernel a cell wide sees
-    them; `gap` [cells] between them.
+    """Masses (2, n, n, n) that a lattice of particles gives to nodes, by quadratic B-splines: two
+    half-spaces that touch at a plane, or have `gap` [cells] between them.
     """
-    line = np.arange(size) - (size - 1) / 2
-    away = np.stack(np.meshgrid(line, line, line, indexing="ij"), -1) @ normal - offset
+    line = (np.arange(3 * (size + 4)) + 0.5) / 3 - (size + 3) / 2
+    points = np.stack(np.meshgrid(line, line, line, indexing="ij"), -1).reshape(-1, 3)
+    away, nodes = points @ normal - offset, np.arange(size) - (size - 1) / 2
 
-    def share(depth):
-        return np.clip(0.5 + depth, 0, 1) ** 2 * (3 - 2 * np.clip(0.5 + depth, 0, 1))
+    def seen(own):
+        d = np.abs(points[own][:, :, None] - nodes)
+        w = np.where(d < 0.5, 0.75 - d**2, 0.5 * np.maximum(1.5 - d, 0) ** 2)
+        return np.einsum("pi,pj,pk->ijk", w[:, 0], w[:, 1], w[:, 2], optimize=True)
 
-    return np.stack([density[0] * share(-away - gap / 2), density[1] * share(away - gap / 2)])
+    return np.stack([density[0] * seen(away < -gap / 2), density[1] * seen(away > gap / 2)])
 
 
 def after(mass, velocity, friction=None):
@@ -65,7 +68,7 @@ def test_two_that_approach_go_on_together_along_the_normal_and_as_they_were_besi
     common = (mass[0] - mass[1]) / (mass[0] + mass[1])
     for k in (0, 1):
         np.testing.assert_allclose(found[0, k][shared], common[shared], atol=1e-14)
-        np.testing.assert_array_equal(found[1:, k], velocity[1:, k])
+        np.testing.assert_allclose(found[1:, k], velocity[1:, k], atol=1e-14)
         np.testing.assert_array_equal(found[:, k][:, ~shared], velocity[:, k][:, ~shared])
     assert shared.any() and not shared.all()
 
@@ -91,22 +94,26 @@ def test_sliding_is_slowed_as_coulomb_has_it(friction, left):
 @pytest.mark.parametrize("density", [(1.0, 1.0), (1.0, 1e4), (1e4, 1.0)])
 def test_the_normal_is_that_of_the_surface_between_them_whatever_they_weigh(density):
     normal = np.array([2.0, 1.0, 0.5]) / 5.25**0.5
-    mass = halves(normal, 0.2, density, size=9)
-    found, shared = after(mass, everywhere(mass, normal, -normal)), shared_nodes(mass)
-    inner = np.zeros_like(shared)
-    inner[2:-2, 2:-2, 2:-2] = True
-    lost = (everywhere(mass, normal, -normal) - found)[:, 0][:, shared & inner]
-    size = np.linalg.norm(lost, axis=0)
-    cosine = normal @ lost[:, size > 0] / size[size > 0]
-    weight = (mass.prod(axis=0) / mass.sum(axis=0))[shared & inner][size > 0]
-    # Degrees by which impulses are off; the kernel's own cube has a part in it.
-    assert np.degrees(np.arccos(np.average(cosine, weights=weight))) < 8
+    mass = halves(normal, 0.2, density)
+    velocity = everywhere(mass, normal, -normal)
+    # Not at the ends, beyond which there is no mass.
+    gained = (mass[0] * (after(mass, velocity) - velocity)[:, 0])[:, 1:-1, 1:-1, 1:-1].reshape(
+        3, -1
+    )
+    impulse = gained.sum(axis=1) / np.linalg.norm(gained.sum(axis=1))
+    assert -impulse @ normal > np.cos(np.radians(2))
+    each = gained / np.maximum(np.linalg.norm(gained, axis=0), 1e-30)
+    spread = np.average(-normal @ each, weights=np.linalg.norm(gained, axis=0))
+    assert spread > np.cos(np.radians(8))
 
 
 def test_what_bounds_both_alike_has_no_part_in_the_normal():
     mass = halves() * np.array([0.1, 0.7, 1.0, 1.0, 1.0, 0.7, 0.1])[:, None]
-    found = after(mass, everywhere(mass, X, -X))
-    assert np.abs(found[1:]).max() < 1e-15 < np.abs(found[0] - everywhere(mass, X, -X)[0]).max()
+    velocity = everywhere(mass, X, -X)
+    lost = velocity - after(mass, velocity)
+    # Of each node, at the sides as in the middle, and along the bar alone.
+    assert np.abs(lost[1:]).max() < 1e-14
+    assert (np.abs(lost[0]).max(axis=(0, 1)) > 0.9).all()
 
 
 def test_objects_touch_at_their_surfaces_and_not_where_their_kernels_end():
@@ -116,8 +123,7 @@ def test_objects_touch_at_their_surfaces_and_not_where_their_kernels_end():
         return shared_nodes(mass).any(), (after(mass, velocity) != velocity).any()
 
     assert meets(0.0) == (True, True)
-    assert meets(0.5) == (True, False)
-    assert 0.5 < TOUCH < 1
+    assert meets(1.0) == (True, False)
 
 
 def test_many_at_a_node_keep_momentum_and_gain_no_energy():
@@ -148,9 +154,8 @@ def end(config, model, state, steps=4):
     return state
 
 
-@pytest.mark.parametrize("fields", [2, 3])
-def test_momentum_and_angular_momentum_are_kept(fields):
-    config, model, state = apart(block(), fields)
+def test_momentum_and_angular_momentum_are_kept():
+    config, model, state = apart(block(), 3)
     model = replace(model, gravity=None)
     x, v, C, _ = public(state)
     scale = float(jnp.sum(model.mass) * jnp.abs(v).max())
@@ -178,19 +183,23 @@ def test_far_from_each_other_each_moves_as_it_would_alone():
     same(two, one, 1e-13)
 
 
-@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
-def test_however_it_is_computed(dtype):
+@pytest.mark.parametrize(
+    ("dtype", "way", "small"),
+    [
+        (jnp.float64, {"placement": Placement(1, 16), "window": (8, 8, 8)}, 1e-13),
+        (jnp.float32, {"placement": Placement(4, 16), "window": (8, 8, 8)}, 2e-6),
+    ],
+    ids=["in chunks, in a window", "on four devices, float32"],
+)
+def test_however_it_is_computed(dtype, way, small):
+    if way["placement"].devices > jax.device_count():
+        pytest.skip("needs four host devices: see tests/conftest.py")
     config, model, state = apart(block(dtype=dtype), 3)
     setting = Setting(config.grid, np.asarray(state.position.T), model.volume, np.dtype(dtype))
     floor = Plane((0.0, 0.0, 0.3), friction=0.4, acts_on="nodes")
     model = replace(model, boundaries=prepare((floor,), setting))
-    whole = end(config, model, state)._replace(residual=None)
-    ways = [{"placement": Placement(1, 16)}, {"window": (8, 8, 8)}]
-    if jax.device_count() >= 4:
-        ways += [{"placement": Placement(4, 16), "window": (8, 8, 8)}]
-    for way in ways:
-        found = end(replace(config, **way), model, state)._replace(residual=None)
-        same(found, whole, 2e-6 if dtype == jnp.float32 else 1e-13)
+    found, whole = (end(one, model, state) for one in (replace(config, **way), config))
+    same(found._replace(residual=None), whole._replace(residual=None), small)
 
 
 @pytest.mark.parametrize(
@@ -202,18 +211,6 @@ def test_both_directions_of_its_derivative(options):
     config, model, state = apart(block(count=40))
     loss, numbers = loss_by(replace(config, **options), model, state)
     agree(*both_directions(loss, numbers, direction_of(numbers)))
-
-
-def test_friction_between_objects_has_a_slope_of_its_own():
-    config, model, state = apart(block(count=40))
-
-    def loss(friction):
-        return jnp.sum(end_of(replace(model, friction=friction)).velocity ** 2)
-
-    def end_of(model):
-        return rollout(config, model, state, dt=5e-4, steps=3)
-
-    agree(*both_directions(loss, jnp.asarray(0.3), jnp.asarray(1.0)))
 
 
 def test_devices_share_the_window_as_a_whole():
