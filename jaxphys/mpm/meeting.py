@@ -9,8 +9,8 @@ gains the other loses, at the same node, so that momentum and angular momentum s
 
 With several at one node, pairs come one after the other. In order that momentum stays, the normal
 must be the same for both: the gradient of the log of the ratio of what a node holds of either, each
-in units of its own fullest node. It does not depend on which of them is denser, and what bounds both
-alike, such as the side of a stack, has no part in it.
+in units of its own fullest node. It does not depend on which of them is denser, and what bounds
+both alike, such as the side of a stack, has no part in it.
 
 A kernel reaches further than matter does, so that two objects share nodes while they are still two
 cells apart. They touch where a node is full: what each has there, as a share of what it has a cell
@@ -29,8 +29,8 @@ from jaxphys.core.fields import NON_NEGATIVE, Checked
 from jaxphys.mpm.boundaries.contact import shortened
 
 TOUCH = 0.9
-# Of both, beside what a node holds of either: with it the log of their ratio is in proportion to the
-# distance from the surface between them, to a tenth, wherever they share nodes.
+# Of both, beside what a node holds of either: with it the log of their ratio is in proportion to
+# the distance from the surface between them, to a tenth, wherever they share nodes.
 FLOOR = 0.01
 
 
