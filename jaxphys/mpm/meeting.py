@@ -8,14 +8,14 @@ as Coulomb's law allows, and two that part are left alone. It is an impulse betw
 gains the other loses, at the same node, so that momentum and angular momentum stay.
 
 With several at one node, pairs come one after the other. In order that momentum stays, the normal
-must be the same for both: the gradient of the log of the ratio of what a node holds of either, each
-in units of its own fullest node. It does not depend on which of them is denser, and what bounds
-both alike, such as the side of a stack, has no part in it.
+must be the same for both: the gradient of the log of the ratio of what a node holds of either. Each
+is counted in units of its own fullest node first, and then, with the normal that follows, of what
+it has a cell further inside, in which the sides that it has elsewhere have less of a part.
 
 A kernel reaches further than matter does, so that two objects share nodes while they are still two
-cells apart. They touch where a node is full: what each has there, as a share of what it has a cell
-further inside along the normal, adds up to `TOUCH`. That asks for no density, and holds of shells
-that are thinner than a cell, and of matter that has been loosened, as well.
+cells apart. They touch where a node is full, which is where these shares add up to `TOUCH`. That
+asks for no density, and holds of shells that are thinner than a cell, and of matter that has been
+loosened, as well.
 """
 
 from dataclasses import dataclass, field
@@ -29,6 +29,7 @@ from jaxphys.core.fields import NON_NEGATIVE, Checked
 from jaxphys.mpm.boundaries.contact import shortened
 
 TOUCH = 0.9
+PASSES = 3  # of finding normals
 # Of both, beside what a node holds of either: with it the log of their ratio is in proportion to
 # the distance from the surface between them, to a tenth, wherever they share nodes.
 FLOOR = 0.01
@@ -60,15 +61,17 @@ def meet(mass: Array, velocity: Array, lightest: Array, friction: Array | None) 
 
     def pair(velocity, which):
         a, b = which
-        normal = _normal(shares[a], shares[b])
-        inwards = normal > 0
-        full = _share(mass[a], normal, jnp.where(inwards, before[:, a], after[:, a]))
-        full = full + _share(mass[b], normal, jnp.where(inwards, after[:, b], before[:, b]))
-        touching = there[a] & there[b] & (full >= TOUCH)
+        of_a, of_b = shares[a], shares[b]
+        for _ in range(PASSES):
+            normal = _normal(of_a, of_b)
+            inwards = normal > 0
+            of_a = _share(mass[a], normal, jnp.where(inwards, before[:, a], after[:, a]))
+            of_b = _share(mass[b], normal, jnp.where(inwards, after[:, b], before[:, b]))
+        touching = there[a] & there[b] & (of_a + of_b >= TOUCH)
         lost = _lost(velocity[:, a] - velocity[:, b], normal, friction)
         share = jnp.where(touching, 1 / jnp.where(touching, mass[a] + mass[b], 1), 0)
-        of_a, of_b = -mass[b] * share * lost, mass[a] * share * lost
-        return velocity.at[:, a].add(of_a).at[:, b].add(of_b), None
+        gained = -mass[b] * share * lost, mass[a] * share * lost
+        return velocity.at[:, a].add(gained[0]).at[:, b].add(gained[1]), None
 
     pairs = jnp.asarray(first, jnp.int32), jnp.asarray(second, jnp.int32)
     return jax.lax.scan(pair, velocity, pairs)[0]

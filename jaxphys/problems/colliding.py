@@ -80,7 +80,7 @@ def meeting(truth: Bars, cells: int, dtype=jnp.float64, *, contact: bool = False
         steps=steps,
         scale=truth.parted,
         staggered=False,
-        objects=(points[:, 0] > 0).astype(np.int32) if contact else None,
+        objects=(points[:, 0] > 0).astype(int) if contact else None,
         dtype=dtype,
     )
 

@@ -212,7 +212,7 @@ def discretise(
     volume = jnp.asarray(rest_volume, dtype)
     field = None
     if objects is not None:
-        field = jnp.zeros(room.particles, jnp.int32).at[:count].set(objects)
+        field = jnp.zeros(room.particles, jnp.int32).at[:count].set(objects.astype(np.int32))
     config = Config(
         Grid(room.nodes, 1.0),
         ((law, 0, room.particles),),
