@@ -194,7 +194,7 @@ def solver_parts(
     )
     volume = jnp.asarray(volumes, dtype)
     object_of = np.repeat(np.arange(len(parts)), [len(part.positions) for part in parts])
-    rough = scene.contact is not None and scene.contact.friction > 0
+    friction = 0.0 if scene.contact is None else scene.contact.friction
     model = Model(
         mass=density[arrangement] * volume,
         volume=volume,
@@ -204,7 +204,7 @@ def solver_parts(
         boundaries=boundaries,
         field=None if scene.contact is None else jnp.asarray(object_of[arrangement], jnp.int32),
         # Nor has friction of zero any code.
-        friction=jnp.asarray(scene.contact.friction, dtype) if rough else None,
+        friction=jnp.asarray(friction, dtype) if friction > 0 else None,
     )
     return config, model, state
 
