@@ -197,7 +197,7 @@ def test_gradient_of_a_pixel_loss_is_the_central_difference():
 
 def meeting(contact, **changes):
     """Two objects side by side, the one that comes first in the domain listed last."""
-    right, left = (Object(**(THING | {"centre": (x, 0.5, 0.5)})) for x in (0.7, 0.3))
+    right, left = (Object(**(THING | {"centre": (x, 0.5, 0.5), "size": 0.25})) for x in (0.7, 0.3))
     return replace(scene(), objects=(right, left), contact=contact, **changes)
 
 

@@ -128,7 +128,7 @@ def at_nodes(config: Config, shared: Shared, rows: Array, fixed: Fixed) -> Array
     def updated(common, own):
         shared, lightest = common
         rows, origin = own
-        mass, rows = rows[:, 3], update_grid(shared, lightest, rows)
+        given, rows = rows, update_grid(shared, lightest, rows)
 
         def held(rows):
             return stages.on_grid(
@@ -146,7 +146,7 @@ def at_nodes(config: Config, shared: Shared, rows: Array, fixed: Fixed) -> Array
         apart = config.fields, *config.nodes
         with part("contact between objects"):
             velocity = rows.T[:3].reshape(3, *apart)
-            velocity = meet(mass.reshape(apart), velocity, lightest, shared.friction)
+            velocity = meet(given[:, 3].reshape(apart), velocity, lightest, shared.friction)
             rows = jnp.concatenate([velocity.reshape(3, -1), rows.T[3:]]).T
         return None, jax.vmap(held)(rows.reshape(config.fields, -1, config.columns)).reshape(
             rows.shape
