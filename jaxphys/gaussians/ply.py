@@ -244,8 +244,8 @@ def _require_finite_fields(path, names: list[str], values: np.ndarray) -> None:
         rows = bad[:, column]
         raise InputError(
             f"{path}: field '{names[column]}' is not finite, or beyond {LARGEST:g}, for "
-            f"{rows.sum()} of {rows.size} Gaussians (first: {np.argmax(rows)}); clean it up or "
-            "pass drop_invalid=True"
+            f"{rows.sum()} of {rows.size} Gaussians (first: {np.argmax(rows)}); leave these out by "
+            "jaxphys.gaussians.read_ply(FILE, drop_invalid=True), and write_ply the rest"
         )
 
 
