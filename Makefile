@@ -20,9 +20,6 @@ $(VENV)/installed-test: $(VENV)/installed
 demo: $(VENV)/installed
 	$(BIN)/jaxphys generate "a strawberry" --material jelly --out outputs/demo --overwrite
 
-# Most of the suite is compilation, and less of it takes a third less time. The slow tests, the demo
-# and `jaxphys doctor` run what users run.
-test: export XLA_FLAGS += --xla_backend_optimization_level=0 --xla_llvm_disable_expensive_passes=true
 test: $(VENV)/installed-test
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "not slow"
 
