@@ -1,7 +1,12 @@
-"""Of many points, so many that lie evenly spread."""
+"""Of many points or Gaussians, so many: those that lie evenly spread, or some by chance."""
+
+import math
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
+
+from jaxphys.gaussians.gaussians import Gaussians, select
 
 
 def thin(points: np.ndarray, count: int) -> np.ndarray:
@@ -27,3 +32,26 @@ def thin(points: np.ndarray, count: int) -> np.ndarray:
         number = min(len(alive) - count, max(len(alive) // 10, 1), int(loses.sum()))
         alive = np.delete(alive, order[:number])
     return alive
+
+
+def some_of(total: int, count: int) -> np.ndarray:
+    """Indices, rising, of `count` of so many Gaussians; the same each time. By chance, since small
+    and dense ones, which draw the details, would be the first to go where distances decide.
+    """
+    return np.sort(np.random.default_rng(0).permutation(total)[:count])
+
+
+def enlarged_by(total: int, count: int) -> float:
+    """By what standard deviations grow where `count` of `total` Gaussians stand for all: a surface
+    stays closed.
+    """
+    return math.sqrt(total / count)
+
+
+def fewer(gaussians: Gaussians, count: int) -> Gaussians:
+    """At most `count` of some Gaussians, enlarged so that a surface stays closed."""
+    if gaussians.count <= count:
+        return gaussians
+    chosen = select(gaussians, some_of(gaussians.count, count))
+    larger = np.float32(math.log(enlarged_by(gaussians.count, count)))
+    return replace(chosen, log_scales=chosen.log_scales + larger)

@@ -17,6 +17,7 @@ import numpy as np
 
 from jaxphys.core.ellipsoid_axes import nearest_axes, unit
 from jaxphys.core.errors import InputError
+from jaxphys.gaussians.thinning import enlarged_by, some_of
 from jaxphys.page.quantise import SHAPE_LEVELS, quantised, quantised_rotations
 
 FEWEST_FRAMES = 24  # frames are left out down to these before Gaussians are
@@ -61,18 +62,6 @@ class Packed:
     payload: str
     stride: int
     notes: tuple[str, ...]
-
-
-def some_of(total: int, count: int) -> np.ndarray:
-    """Indices, rising, of `count` of so many Gaussians; the same each time. By chance, since small
-    and dense ones, which draw the details, would be the first to go where distances decide."""
-    return np.sort(np.random.default_rng(0).permutation(total)[:count])
-
-
-def enlarged_by(total: int, count: int) -> float:
-    """By what standard deviations grow where `count` of `total` Gaussians stand for all: a surface
-    stays closed."""
-    return math.sqrt(total / count)
 
 
 def thinned(moving: Moving, count: int) -> Moving:

@@ -21,8 +21,9 @@ from jaxphys.gaussians import harmonics as sh
 from jaxphys.gaussians.colour import regularise
 from jaxphys.gaussians.gaussians import Gaussians, concatenate, opacities, select, with_degree
 from jaxphys.gaussians.ply import read_ply
+from jaxphys.gaussians.thinning import fewer, some_of
 from jaxphys.mpm.simulation import Simulation
-from jaxphys.page.motion_data import Moving, some_of, thinning_note
+from jaxphys.page.motion_data import Moving, thinning_note
 from jaxphys.pipeline.deform import bake
 from jaxphys.pipeline.draw import placed_solids
 from jaxphys.pipeline.frames import frames
@@ -31,7 +32,6 @@ from jaxphys.render.camera import Camera, position
 from jaxphys.scene.build import build
 from jaxphys.scene.look import Look
 from jaxphys.scene.obstacles import located
-from jaxphys.scene.place import fewer
 from jaxphys.scene.placement import Placement
 from jaxphys.scene.read import read_scene
 from jaxphys.scene.scene import Scene

@@ -25,10 +25,10 @@ from jaxphys.gaussians.harmonics import dc_to_rgb, rgb_to_dc
 from jaxphys.gaussians.hull import GAP, surface_spacing
 from jaxphys.gaussians.lone import lone_points
 from jaxphys.gaussians.relax import blue_noise
+from jaxphys.gaussians.thinning import fewer
 from jaxphys.gaussians.volumes import cell_volumes
 from jaxphys.mpm.grid import Grid
 from jaxphys.mpm.transfer.kernels import Kernel
-from jaxphys.page.motion_data import enlarged_by, some_of
 from jaxphys.scene.placement import Placement
 from jaxphys.scene.scene import Object
 
@@ -157,15 +157,6 @@ def place(
     placement = Placement.of(rotation, scale, middle, centre)
     left_out = int(cropped + np.sum(chosen & ~kept))
     return Placed(moving, still, filling, volumes, left_out, placement)
-
-
-def fewer(gaussians: Gaussians, count: int) -> Gaussians:
-    """At most `count` of some Gaussians, enlarged so that a surface stays closed."""
-    if gaussians.count <= count:
-        return gaussians
-    chosen = select(gaussians, some_of(gaussians.count, count))
-    larger = np.float32(math.log(enlarged_by(gaussians.count, count)))
-    return replace(chosen, log_scales=chosen.log_scales + larger)
 
 
 def _frame(means: np.ndarray, size: float) -> tuple[np.ndarray, float]:

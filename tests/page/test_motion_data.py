@@ -7,7 +7,8 @@ import pytest
 
 from jaxphys.core.ellipsoid_axes import CUBE, CUBE_QUATERNIONS
 from jaxphys.core.errors import InputError
-from jaxphys.page.motion_data import continued, every, pack, some_of
+from jaxphys.gaussians.thinning import some_of
+from jaxphys.page.motion_data import continued, every, pack
 from tests.page.moving import covariances, rotation, tumbling, unpacked
 
 ROOM = 4_000_000
