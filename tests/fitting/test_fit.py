@@ -312,7 +312,7 @@ def test_problems_that_see_other_numbers_share_their_programs(simulation, truth)
     shared = solved(other)
     place, data = asked.layout.start(), asked.data()
     twenty, forty = (asked.compare(place, data, 3, Program(n, (0,))) for n in (20, 40))
-    assert 0 < np.abs(twenty.motion.position - forty.motion.position).max() < 1e-4
+    assert 0 < np.abs(twenty.motion.position - forty.motion.position).max() < 3e-4
     assert other._compiled == programs
     alone = fit(simulation, FREE, Tracks(noisy, np.array(TIMES), noise=1e-3), steps=20)
     np.testing.assert_array_equal(shared.vector, alone.vector)
