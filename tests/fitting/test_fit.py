@@ -61,6 +61,7 @@ FREE = {
 }
 
 
+@pytest.mark.slow
 def test_a_motion_at_times_is_the_rollout_to_them(simulation):
     """Free flight under gravity, of the middle of mass: x + v t + g t^2 / 2 to the step's order."""
     moved = simulation.with_(velocity=(0.3, -0.1, 0.2))
@@ -258,6 +259,7 @@ def test_how_a_boundary_moves_may_be_free():
             layout({name: Free(0.3)}, made, None)
 
 
+@pytest.mark.slow
 def test_a_number_whose_best_is_beyond_its_bound_ends_beside_it(simulation, truth):
     """The truth is 0.25 and at most 0.2 is allowed: the fit ends there, finite and converged."""
     free = {"poisson_ratio": Bounded(0.1, 0.0, 0.2), "youngs_modulus": Log(2000.0)}
@@ -291,6 +293,7 @@ def test_steps_that_are_asked_for_are_taken(simulation, truth):
         problem(simulation, layout(FREE, simulation, None), (tracks,), steps=0)
 
 
+@pytest.mark.slow
 def test_a_fit_that_diverges_keeps_the_best_and_says_why(simulation, truth):
     """A rate that throws the block out of the domain: its start was better than all after it."""
     free = {"velocity": Free((0.0, 0.0, 0.0), size=300.0)}

@@ -77,6 +77,7 @@ def in_two_stages(guides):
 
 
 @pytest.mark.parametrize("after", [1, 2, 5])
+@pytest.mark.slow
 def test_two_stages_resume_to_the_same_bytes(guides, in_two_stages, after):
     """Interrupted within geometry, at its end and within appearance."""
     states, end, key = in_two_stages
@@ -85,6 +86,7 @@ def test_two_stages_resume_to_the_same_bytes(guides, in_two_stages, after):
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.slow
 def test_stages_ask_what_they_say(guides, in_two_stages):
     """How much the 3D prior counts decides geometry and leaves appearance alone."""
     states, end, key = in_two_stages
@@ -112,6 +114,7 @@ def test_a_rate_of_zero_keeps_a_field(guides):
     assert np.abs(moved).max() > 1e-4
 
 
+@pytest.mark.slow
 def test_interval_score_matching_reaches_the_gaussians(guides):
     usual, key = replace(CONFIG, steps=1), jax.random.key(0)
     config = replace(usual, image=replace(CONFIG.image, method="ism", inversion=2))

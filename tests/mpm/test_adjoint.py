@@ -92,7 +92,12 @@ def test_gradient_is_the_central_difference_to_second_order(plain):
     assert coarse / fine > 50  # 100 for an exact gradient, 1 for a wrong one
 
 
-@pytest.mark.parametrize("segments", [None, 1, 2, 3, 7, 50])
+def slow(*values):
+    """Each compiles a gradient of its own."""
+    return [pytest.param(value, marks=pytest.mark.slow) for value in values]
+
+
+@pytest.mark.parametrize("segments", [7, *slow(None, 1, 2, 3, 50)])
 def test_checkpointed_gradient_is_the_plain_one(plain, segments):
     config, model, state, numbers, value, gradient = plain
     loss = problem(config, 7, Checkpointed(segments))
@@ -102,7 +107,7 @@ def test_checkpointed_gradient_is_the_plain_one(plain, segments):
         np.testing.assert_allclose(a, b, atol=1e-13 * float(jnp.abs(b).max()))
 
 
-@pytest.mark.parametrize("adjoint", [Plain(), Checkpointed(), Checkpointed(6)])
+@pytest.mark.parametrize("adjoint", [Checkpointed(6), *slow(Plain(), Checkpointed())])
 def test_gradient_through_frames(plain, adjoint):
     config, model, state, numbers, _, _ = plain
 
@@ -147,6 +152,7 @@ def memory(steps, adjoint):
     return compiled.memory_analysis().temp_size_in_bytes
 
 
+@pytest.mark.slow
 def test_checkpoints_save_memory():
     assert memory(400, Checkpointed()) < 0.2 * memory(400, Plain())
 

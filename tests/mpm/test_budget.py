@@ -97,7 +97,7 @@ def test_the_measured_peak_fits_and_the_gradient_is_the_same(thrown):
         gradient(loss, Checkpointed(bytes=20 * a_step))
 
 
-@pytest.mark.parametrize(("frames", "room"), [(11, 22), (41, 38)])
+@pytest.mark.parametrize(("frames", "room"), [pytest.param(11, 22, marks=pytest.mark.slow), (41, 38)])
 def test_frames_in_a_budget(thrown, frames, room):
     """The starts of all frames, and of groups of frames."""
     config, model, state = block(count=300, shape=(12, 12, 12))
@@ -113,6 +113,7 @@ def test_frames_in_a_budget(thrown, frames, room):
     assert peak <= room * thrown[1] < everything
 
 
+@pytest.mark.slow
 def test_truncated_is_the_gradient_of_the_last_steps():
     config, model, state = block(count=20)
     modulus = model.parameters["youngs_modulus"]

@@ -267,6 +267,7 @@ def test_a_gradient_reaches_every_number_of_the_start():
         assert expected != 0
 
 
+@pytest.mark.slow
 def test_beyond_the_step_traced_numbers_are_an_answer_or_a_failure():
     """Fixed steps say that they are too long, with no gradient; those that adapt are right."""
     strained = np.diag([1.002, 1.0, 1.0])

@@ -34,7 +34,8 @@ def several(names=NAMES):
     config = Config(Grid((8, 8, 8), 0.1), segments)
     position = 0.22 + 0.2 * random.random((count, 3))
     F = np.eye(3) + 0.04 * random.normal(size=(count, 3, 3))
-    F[:EACH] = np.eye(3) * (1 + 0.01 * random.normal(size=(EACH, 1, 1)))
+    if names[0] == "water":  # a fluid's start is a multiple of the identity
+        F[:EACH] = np.eye(3) * (1 + 0.01 * random.normal(size=(EACH, 1, 1)))
     volume = 1e-4 * (1 + random.random(count))
     boundaries = prepare(
         (Plane((0.0, 0.0, 0.21), friction=0.3),),
@@ -66,7 +67,7 @@ UNITS = dict.fromkeys(STRESSES, 1e3) | {"viscosity": 50.0, "plastic_viscosity": 
 
 
 # Each compiles for half a minute; every law's gradient is in docs/gradients.jsonl too.
-QUICK = ("plasticine", "snow", "memory-foam")
+QUICK = ("snow",)
 
 
 @pytest.mark.parametrize(

@@ -404,8 +404,8 @@ def test_only_a_scheme_that_keeps_velocities_has_code_for_them():
 @pytest.mark.parametrize(
     "transfer",
     [
-        Transfer(FLIP(0.9)),
         Transfer(AFLIP(1.0), "cubic"),
+        pytest.param(Transfer(FLIP(0.9)), marks=pytest.mark.slow),
         pytest.param(Transfer(PIC(), "cubic"), marks=pytest.mark.slow),
         pytest.param(CUBIC, marks=pytest.mark.slow),
     ],

@@ -279,6 +279,7 @@ def swing(share, bound, steps=5000):
     return np.asarray(most / first), int(end.status.code)
 
 
+@pytest.mark.slow
 def test_a_particle_alone_keeps_its_energy_at_the_bound():
     def bound(law, parameters, F, density, spacing):
         return isolated_bound(law, parameters, F, 0 * F, density, spacing)

@@ -85,6 +85,7 @@ def test_missing_weights_are_said_before_anything_is_written(tmp_path, monkeypat
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_an_endpoint_s_answer_reaches_the_video(tmp_path, monkeypatch):
     """With the bundled priors themselves; the key stays out of every file."""
     content = "a strawberry, red heart-shaped fruit, small yellow seeds, green leafy cap"

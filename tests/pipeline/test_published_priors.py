@@ -25,6 +25,7 @@ SCENE = Scene(
     height=24,
 )
 LAYOUTS = ("plain", "sharded", "old", "fp16")
+pytestmark = pytest.mark.slow  # minutes: whole runs with small copies of the published networks
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +59,7 @@ def test_another_checkpoint_makes_another_object(made):
     assert (made / "fp16" / name).read_bytes() != (made / "plain" / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_point_e_reaches_a_video(tmp_path, monkeypatch):
     monkeypatch.setenv("JAXPHYS_WEIGHTS", str(tmp_path))
     monkeypatch.setitem(sample_point_e.__kwdefaults__, "config", PointESampling(steps=3))

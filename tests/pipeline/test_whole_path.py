@@ -78,7 +78,7 @@ def brute_force_picture(simulation, look, state):
     return render_dense(jax.tree.map(jnp.asarray, splats), CAMERA, jnp.ones(3), SETTINGS)[0]
 
 
-@pytest.mark.parametrize("which", ["hollow", "filled"])
+@pytest.mark.parametrize("which", ["hollow", pytest.param("filled", marks=pytest.mark.slow)])
 def test_pictures_show_every_gaussian_on_its_own_particle(which, request):
     simulation, look = request.getfixturevalue(which)
     motion = jax.jit(rollout_frames, static_argnames="frames")(simulation, frames=3)

@@ -96,6 +96,7 @@ def test_the_ringing_reference_has_converged_and_is_the_linear_wave_when_it_is_q
     assert np.abs(loud - linear).max() > 0.02 * np.abs(linear).max()
 
 
+@pytest.mark.slow
 def test_the_ringing_cube_converges_under_henckys_law_to_its_own_wave():
     coarse, fine = (ringing(Ringing(hencky=True), cells) for cells in (4, 8))
     end = solve(fine)
@@ -117,7 +118,7 @@ def test_the_angle_of_grains_is_that_of_plane_strain():
 @pytest.mark.parametrize(
     ("name", "levels", "order", "band"),
     [
-        ("poiseuille", (4, 8, 16), 2.0, 0.35),
+        pytest.param("poiseuille", (4, 8, 16), 2.0, 0.35, marks=pytest.mark.slow),
         ("ringing-cube", (6, 9, 12), 2.0, 0.25),
         ("taylor-green", (4, 8, 16), 2.0, 0.3),
     ],

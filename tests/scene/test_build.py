@@ -170,6 +170,7 @@ def test_unknown_parameter_of_with():
         build(scene(), GAUSSIANS).simulation.with_(young=3.0)
 
 
+@pytest.mark.slow
 def test_gradient_of_a_pixel_loss_is_the_central_difference():
     simulation, look = build(scene(velocity=(0.0, 0.0, -1.0), spin=(3.0, 0.0, 0.0)), GAUSSIANS)
     simulation = jax.tree.map(

@@ -139,6 +139,7 @@ def heights(name, *counts, spacing=0.1):
     return [at[middle, 2].max() - scene.ground.height for at in (start, *ends)]
 
 
+@pytest.mark.slow
 def test_foam_keeps_its_dent_for_a_while_and_loses_it():
     # The bar leaves it at some 1.1 s; then it comes back to where its own weight lets it.
     start, pressed, soon, late = heights("memory-foam", 20, 34, 96)
@@ -146,6 +147,7 @@ def test_foam_keeps_its_dent_for_a_while_and_loses_it():
     assert soon < late - 0.2 * (late - pressed)
 
 
+@pytest.mark.slow
 def test_muscle_shortens_and_lengthens_again():
     """Contracted after 0.4 s and slack after 0.8 s."""
     start, short, long = heights("muscle", 10, 19)

@@ -304,6 +304,7 @@ def test_a_failure_is_one_line_until_a_reset():
     steps(session, 1)
 
 
+@pytest.mark.slow
 def test_a_larger_scene_runs_on_a_coarser_grid():
     fine = scene(domain=Domain((SIDE,) * 3, 0.02))
     session = Session(fine, (cube(),), nodes=5000, gaussians=100)

@@ -127,6 +127,7 @@ def test_a_registered_material_is_known_everywhere():
     assert "law one's own gas" in plan.included and plan.substep > 0
 
 
+@pytest.mark.slow
 def test_what_depends_on_directions_must_say_so():
     declared = FIBRES.declared
     defaults = {n: MATERIALS["muscle"].defaults[n] for n in (*FIBRES.parameters, "density")}

@@ -180,6 +180,7 @@ def loss():
     return run, state.velocity
 
 
+@pytest.mark.slow
 def test_the_gradient_is_that_of_the_realised_steps(loss, taken):
     """Against differences of the same steps, replayed; each adjoint gives it."""
     run, velocity = loss
@@ -227,6 +228,7 @@ def test_the_gradient_of_frames_that_failed_is_not_a_number(loss, adjoint):
     assert np.isnan(value) and all(np.isnan(g).all() for g in gradients)
 
 
+@pytest.mark.slow
 def test_the_gradient_of_a_replay_that_failed_is_not_a_number(taken):
     config, model, state, _, dt = taken
 
@@ -390,6 +392,7 @@ def test_devices_take_the_same_steps(taken):
     np.testing.assert_allclose(other.position, end.position, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_float32_hits_the_frame_too():
     config, model, state = stiff(dtype=jnp.float32)
     run = jax.jit(partial(rollout_adaptively, config, stepping=STEPPING, record=ROOM))
