@@ -41,7 +41,8 @@ class VideoWriter:
             "-c:v", "libx264", "-preset", "veryfast", "-crf", str(quality), "-pix_fmt", "yuv420p",
             # One thread, no dates, no version of the muxer: nothing but the pictures decides.
             "-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1",
-            "-movflags", "+faststart", str(path),
+            # A relative path may begin as an option or a protocol does.
+            "-movflags", "+faststart", os.path.abspath(path),
         ]  # fmt: skip
         # A group of its own: an interrupt is for us to handle, and the file must be closed well.
         self._process = subprocess.Popen(
