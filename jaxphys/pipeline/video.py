@@ -134,5 +134,8 @@ class ContactSheet:
 
 def write_picture(path: str | os.PathLike, picture: np.ndarray) -> None:
     """Writes (height, width, 3) uint8 as a PNG, aside first."""
+    # In memory first: on a full disk the library would leave a traceback beside our line.
+    encoded = imwrite("<bytes>", picture, extension=".png", plugin="pillow")
+    assert encoded is not None  # of "<bytes>"
     with atomic_path(path) as aside:
-        imwrite(aside, picture, extension=".png", plugin="pillow")
+        aside.write_bytes(encoded)
