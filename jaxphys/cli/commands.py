@@ -403,6 +403,8 @@ def materials(*, json: bool = False, markdown: bool = False) -> int:
     """
     from jaxphys.cli.listing import materials_markdown, materials_text
 
+    if json and markdown:
+        raise InputError("--json, --markdown: ask for one of them")
     print(materials_markdown() if markdown else materials_text(as_json=json))
     return 0
 

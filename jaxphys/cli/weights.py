@@ -5,6 +5,8 @@ from typing import Annotated
 import tyro
 from tyro.conf import Positional
 
+from jaxphys.core.errors import InputError, nearest
+
 Name = Annotated[Positional[str], tyro.conf.arg(metavar="NAME")]
 
 
@@ -30,10 +32,10 @@ def path(name: Name, /) -> int:
     Args:
         name: As in the list.
     """
-    from jaxphys.weights import manifest, weights_path
+    from jaxphys.weights import weights_path
     from jaxphys.weights.resolve import locate
 
-    print(weights_path(name) if name in manifest() else locate(name, fetch=False))
+    print(weights_path(name) if _is_bundled(name) else locate(name, fetch=False))
     return 0
 
 
@@ -46,10 +48,10 @@ def fetch(name: Name, /, *, half: bool = False) -> int:
         name: As in the list.
         half: Fetch half precision where it is published, which is half as much.
     """
-    from jaxphys.weights import manifest, weights_path
+    from jaxphys.weights import weights_path
     from jaxphys.weights.resolve import fetch as run
 
-    print(weights_path(name) if name in manifest() else run(name, half=half))
+    print(weights_path(name) if _is_bundled(name) else run(name, half=half))
     return 0
 
 
@@ -63,16 +65,26 @@ def verify(name: Name, /) -> int:
         name: As in the list.
     """
     from jaxphys.cli.weights_listing import verdicts_text
-    from jaxphys.weights import load, manifest
+    from jaxphys.weights import load
     from jaxphys.weights.verify import verify as run
 
-    if name in manifest():
+    if _is_bundled(name):
         load(name)
         print(f"{name}: comes with this package, its SHA-256 matches")
         return 0
     folder, verdicts = run(name)
     print(verdicts_text(folder, verdicts))
     return 1 if any(verdict.problem for verdict in verdicts) else 0
+
+
+def _is_bundled(name: str) -> bool:
+    """Whether a network comes with this package. Raises InputError for a name of none."""
+    from jaxphys.weights import manifest
+    from jaxphys.weights.catalogue import known_names
+
+    if name not in (known := {*manifest(), *known_names()}):
+        raise InputError(f"weights: unknown name {name!r}; {nearest(name, known)}")
+    return name in manifest()
 
 
 # tyro takes functions where types stand, which no type checker knows.

@@ -7,6 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, get_args
 
+import numpy as np
+
 from jaxphys.core.errors import InputError, nearest, shown
 
 # Where a field declares no bound of its own: squares and products of two still fit float32.
@@ -68,6 +70,8 @@ def _check_form(name: str, value: Any, rules: Mapping[str, Any]) -> None:
         if "nonzero" in rules and not any(value):
             raise InputError(f"{name}: is zero; give a direction, of any length")
     for text in value if isinstance(value, tuple) else (value,):
+        if isinstance(text, str | bool) and {"least", "most", "above"} & set(rules):
+            raise InputError(f"{name}: expected a number, found {shown(text)}")
         if "one_of" in rules and text is not None and text not in rules["one_of"]:
             raise InputError(
                 f"{name}: unknown value {shown(text)}; {nearest(str(text), rules['one_of'])}"
@@ -89,6 +93,14 @@ def check_number(name: str, number: float, rules: Mapping[str, Any]) -> None:
 
 def _bound(value: float) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def numbers_of(name: str, value: Any) -> np.ndarray:
+    """A number, or nested ones, as a float64 array; raises `InputError` where something is none."""
+    try:
+        return np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: expected numbers, found {shown(value)}") from None
 
 
 def check_value(name: str, value: Any, rules: Mapping[str, Any]) -> None:

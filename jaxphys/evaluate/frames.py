@@ -1,5 +1,6 @@
 """The pictures of a video as CLIP reads them, evenly spaced."""
 
+import os
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -37,7 +38,7 @@ def _decoded(path: Path) -> Iterator[np.ndarray]:
 
     command = [
         imageio_ffmpeg.get_ffmpeg_exe(), "-nostdin", "-loglevel", "error", "-xerror",
-        "-i", str(path), "-map", "0:v:0", "-f", "image2pipe", "-c:v", "ppm", "pipe:1",
+        "-i", os.path.abspath(path), "-map", "0:v:0", "-f", "image2pipe", "-c:v", "ppm", "pipe:1",
     ]  # fmt: skip
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         stream, complaints = process.stdout, process.stderr

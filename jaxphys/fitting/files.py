@@ -19,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.files import atomic_path
 from jaxphys.core.reading import reading
 from jaxphys.fitting.observed import Images, Masks, Observed, Points, Tracks
 from jaxphys.render.camera import Camera
@@ -127,5 +128,5 @@ def write_observed(path: str | os.PathLike, observed: Observed) -> None:
                 arrays[f"camera_{name}"] = np.stack([np.asarray(getattr(v, name)) for v in views])
         case _:
             raise InputError(f"{observed.name}: has no form as a file")
-    with open(path, "wb") as file:
+    with atomic_path(path) as aside, open(aside, "wb") as file:
         np.savez_compressed(file, **arrays)

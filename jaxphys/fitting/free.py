@@ -14,6 +14,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
+from jaxphys.core.fields import numbers_of
 
 Per = Literal["scene", "object", "particle"]
 LN10 = float(np.log(10))
@@ -43,7 +44,7 @@ class Free:
     size: float | None = field(default=None, kw_only=True)
 
     def __post_init__(self):
-        start = np.asarray(self.start, np.float64)
+        start = numbers_of("free: start", self.start)
         if not np.all(np.isfinite(start)):
             raise InputError(f"free: start is {self.start}: give finite numbers")
         if self.per not in get_args(Per):

@@ -160,6 +160,8 @@ class Layout:
             numbers["boundaries"] = boundaries
         if numbers:
             simulation = simulation.with_(**numbers)
+        if boundaries and look is not None:
+            look = look.following(simulation.model.boundaries)
         if drawn and look is not None:
             gaussians = look.gaussians
             changed = {

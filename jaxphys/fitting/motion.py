@@ -65,7 +65,7 @@ def motion_at(
 
     def look(state: State):
         frame = simulation.frame(state)
-        return frame.position, frame.deformation, frame.time, frame.status
+        return frame.position, frame.deformation, frame.time, frame.status, frame.body
 
     first = 1 if times[0] == 0 else 0
     inner: Adjoint = Plain()
@@ -93,27 +93,27 @@ def motion_at(
     if len(times) > first:
         dt = jnp.asarray(intervals[first:] / steps, state.position.dtype)
         moments.append(jax.lax.scan(body, state, (dt, jnp.arange(first, len(times))))[1])
-    position, deformation, time, status = jax.tree.map(
+    position, deformation, time, status, rigid = jax.tree.map(
         lambda *parts: jnp.concatenate(parts), *moments
     )
-    return Motion(position, deformation, time, status, simulation.carriers)
+    return Motion(position, deformation, time, status, simulation.carriers, rigid)
 
 
 def still(simulation: Simulation, times: tuple[float, ...]) -> Motion:
     """A motion in which nothing moves, at `times` [s]: what a fit must beat."""
     frame = simulation.frame(simulation.state)
-    position, deformation, status = jax.tree.map(
+    position, deformation, status, body = jax.tree.map(
         lambda x: jnp.repeat(x[None], len(times), axis=0),
-        (frame.position, frame.deformation, frame.status),
+        (frame.position, frame.deformation, frame.status, frame.body),
     )
-    return Motion(
-        position, deformation, jnp.asarray(times, position.dtype), status, simulation.carriers
-    )
+    time = jnp.asarray(times, position.dtype)
+    return Motion(position, deformation, time, status, simulation.carriers, body)
 
 
 def some(motion: Motion, which: np.ndarray) -> Motion:
     """Some frames of a motion, (T,) of them."""
-    position, deformation, time, status = jax.tree.map(
-        lambda x: x[which], (motion.position, motion.deformation, motion.time, motion.status)
+    position, deformation, time, status, body = jax.tree.map(
+        lambda x: x[which],
+        (motion.position, motion.deformation, motion.time, motion.status, motion.body),
     )
-    return Motion(position, deformation, time, status, motion.carriers)
+    return Motion(position, deformation, time, status, motion.carriers, body)

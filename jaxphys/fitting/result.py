@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from jaxphys.core.checkpoints import fingerprint
-from jaxphys.core.files import write_json
+from jaxphys.core.files import atomic_path, write_json
 from jaxphys.core.run_folder import RunFolder, run_folder
 from jaxphys.fitting.uncertainty import Uncertainty
 from jaxphys.mpm.motion import Motion
 from jaxphys.mpm.simulation import Simulation
+from jaxphys.pipeline.output import write_lines
 from jaxphys.scene.look import Look
 
 SHOWN = 24  # numbers that a table or a curve shows
@@ -100,11 +101,10 @@ class Fit:
     def write(self, folder: RunFolder) -> None:
         """Writes the same into a run's folder, in which the names are declared."""
         write_json(folder.file(RESULT), self.to_json())
-        with open(folder.file(ARRAYS), "wb") as file:
-            arrays: dict[str, Any] = {n: np.asarray(value) for n, value in self.values.items()}
+        arrays: dict[str, Any] = {n: np.asarray(value) for n, value in self.values.items()}
+        with atomic_path(folder.file(ARRAYS)) as aside, open(aside, "wb") as file:
             np.savez(file, **arrays)
-        text = "".join(json.dumps(row) + "\n" for row in self.history)
-        folder.file(HISTORY).write_text(text)
+        write_lines(folder.file(HISTORY), list(self.history))
 
     def __str__(self) -> str:
         lines = []

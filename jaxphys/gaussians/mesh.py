@@ -298,7 +298,8 @@ def _joined(path: Path, parts: list[tuple[np.ndarray, Any]], up: str) -> Mesh:
     if not np.isfinite(colours).all():
         raise InputError(f"{path}: colours that are not finite; repair the mesh")
     if up == "y":
-        corners = np.stack([corners[..., 0], -corners[..., 2], corners[..., 1]], axis=-1)
+        # Not -z: a zero without sign is read again as it is.
+        corners = np.stack([corners[..., 0], 0 - corners[..., 2], corners[..., 1]], axis=-1)
     uvs = np.clip(np.nan_to_num(uvs), -_MOST_REPEATS, _MOST_REPEATS)
     return Mesh(corners, colours, uvs, tuple(textures), texture, cutoffs)
 

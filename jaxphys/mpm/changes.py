@@ -13,7 +13,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
-from jaxphys.core.fields import PLACE, RATE, SPEED, between, check_number
+from jaxphys.core.fields import PLACE, RATE, SPEED, between, check_number, numbers_of
 from jaxphys.mpm.boundaries import Setting
 from jaxphys.mpm.materials.parameters import Parameter, check_parameter
 from jaxphys.mpm.state import Config, Model, State, refuse_inverted
@@ -53,7 +53,7 @@ class Layout:
     def array(self, name: str, value: Any, rules: Mapping) -> Array:
         """`value` as an array, its range checked."""
         if not is_traced(value):
-            known = np.asarray(value, np.float64)
+            known = numbers_of(f"with_: {name}", value)
             for number in (known.min(initial=0), known.max(initial=0)):
                 check_number(f"with_: {name}", float(number), rules)
         return jnp.asarray(value, self.dtype)
@@ -207,6 +207,12 @@ def with_boundaries(
         moved: whether particles start elsewhere.
     """
     made = list(boundaries)
+    if not isinstance(changes, Mapping) or not all(
+        isinstance(v, Mapping) for v in changes.values()
+    ):
+        raise InputError(
+            "with_: boundaries: give numbers by place and name, such as {0: {'friction': 0.2}}"
+        )
     if friction is not None:
         rough = [index for index, boundary in enumerate(made) if boundary.rough]
         if not rough:
@@ -217,7 +223,7 @@ def with_boundaries(
             made[index] = _with_numbers(made[index], index, {"friction": friction})
     for index, values in changes.items():
         if index not in range(len(made)):
-            raise InputError(f"with_: boundaries[{index}]: there are {len(made)}, counted from 0")
+            raise InputError(f"with_: boundaries[{index!r}]: there are {len(made)}, counted from 0")
         made[index] = _with_numbers(made[index], index, values)
     for index, boundary in enumerate(made):
         names = set(changes.get(index, ()))

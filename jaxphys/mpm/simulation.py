@@ -151,7 +151,8 @@ class Simulation:
             friction: Coulomb's coefficient of every boundary that has one.
             boundaries: other numbers of single boundaries, by their place in the scene's list, such
                 as `{0: {"point": (0.0, 0.0, 0.2)}}`. Where these say which particles are meant,
-                they are chosen anew; a choice has no slope, so it adds nothing to a gradient.
+                they are chosen anew; a choice has no slope, so it adds nothing to a gradient. Drawn
+                obstacles follow by `look.following(simulation.model.boundaries)`.
             parameters: of the materials, such as `youngs_modulus`: a number or (N,).
 
         Arrays (N,) and (N, 3) are in the object's order: each object's Gaussians as they were

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from jaxphys.core.errors import InputError
 from jaxphys.mpm.loop.frames import next_frame, slabs_for
 from jaxphys.mpm.loop.status import check
 from jaxphys.mpm.loop.window import windowed
@@ -177,6 +178,9 @@ def simulate(simulation: Simulation, count: int, *, particles: Array | None = No
         particles: those that frames hold, see `Simulation.frame`; None: all.
 
     Raises:
+        InputError: less than one frame.
         SimulationError: names frame, particle and remedy.
     """
+    if count < 1:
+        raise InputError(f"simulate: {count} frames; give at least 1")
     return join([moment.frame for moment in islice(frames(simulation, particles=particles), count)])

@@ -41,7 +41,8 @@ class VideoWriter:
             "-c:v", "libx264", "-preset", "veryfast", "-crf", str(quality), "-pix_fmt", "yuv420p",
             # One thread, no dates, no version of the muxer: nothing but the pictures decides.
             "-threads", "1", "-fflags", "+bitexact", "-flags:v", "+bitexact", "-map_metadata", "-1",
-            "-movflags", "+faststart", str(path),
+            # A relative path may begin as an option or a protocol does.
+            "-movflags", "+faststart", os.path.abspath(path),
         ]  # fmt: skip
         # A group of its own: an interrupt is for us to handle, and the file must be closed well.
         self._process = subprocess.Popen(
@@ -133,5 +134,8 @@ class ContactSheet:
 
 def write_picture(path: str | os.PathLike, picture: np.ndarray) -> None:
     """Writes (height, width, 3) uint8 as a PNG, aside first."""
+    # In memory first: on a full disk the library would leave a traceback beside our line.
+    encoded = imwrite("<bytes>", picture, extension=".png", plugin="pillow")
+    assert encoded is not None  # of "<bytes>"
     with atomic_path(path) as aside:
-        imwrite(aside, picture, extension=".png", plugin="pillow")
+        aside.write_bytes(encoded)

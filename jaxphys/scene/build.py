@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from jaxphys.core.errors import InputError
+from jaxphys.core.errors import InputError, shown
 from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.mpm.boundaries import Damping, Setting, prepare
 from jaxphys.mpm.grid import Grid
@@ -29,6 +29,7 @@ from jaxphys.mpm.state import Config, Model, State, initial_state
 from jaxphys.mpm.stepping import Fixed, Implicit
 from jaxphys.mpm.stepping.frame_steps import frame_steps
 from jaxphys.mpm.transfer.kernels import Kernel
+from jaxphys.scene.json import scene_from_json, to_json
 from jaxphys.scene.look import Look, look_of
 from jaxphys.scene.obstacles import sampled
 from jaxphys.scene.place import Placed, place
@@ -68,11 +69,16 @@ class Particles:
 
 
 def validate(scene: Scene) -> None:
-    """Refuses materials and parameters that do not exist or are out of range, before any work.
+    """Refuses what its file could not hold, and materials and parameters that do not exist or are
+    out of range, before any work.
 
     Raises:
         InputError: naming the field.
     """
+    try:
+        scene = scene_from_json(to_json(scene))
+    except InputError as error:
+        raise InputError(str(error).removeprefix("scene.")) from None
     for i, thing in enumerate(scene.objects):
         where = f"objects[{i}]"
         try:
@@ -122,6 +128,11 @@ def place_objects(
         raise InputError(
             f"build: {len(objects)} sets of Gaussians for {len(scene.objects)} objects"
         )
+    for i, gaussians in enumerate(objects):
+        if not isinstance(gaussians, Gaussians):
+            raise InputError(
+                f"build: objects[{i}] is {shown(gaussians)}; give Gaussians, as jaxphys.load reads"
+            )
     grid = solver_grid(scene)
     return tuple(
         place(gaussians, thing, grid, scene.transfer.spline, f"objects[{i}]", scene.seed + i, most)
@@ -129,7 +140,7 @@ def place_objects(
     )
 
 
-def particles_of(placed: Placed, thing: Object) -> Particles:
+def particles_of(placed: Placed, thing: Object, grid: Grid) -> Particles:
     """The particles of an object that is in its place."""
     positions = np.concatenate([np.asarray(placed.moving.means), placed.filling])
     x, y, z = np.asarray(thing.spin, np.float64)
@@ -137,9 +148,9 @@ def particles_of(placed: Placed, thing: Object) -> Particles:
     arms = positions - np.asarray(thing.centre)
     material = material_of(thing)
     values = material_values(material, thing.parameters)
+    setting = Setting(grid, positions, placed.volumes, positions.dtype)
     for region in thing.regions:
-        offset = np.abs(positions - np.asarray(region.centre))
-        inside = np.all(offset < np.asarray(region.half_size), axis=1)
+        inside = setting.in_box(np.asarray(region.centre), np.asarray(region.half_size))
         for name, value in overridden(material, region.parameters).items():
             values[name] = np.where(inside, value, values[name])
     return Particles(
@@ -227,7 +238,9 @@ def build(
     dtype = jnp.zeros((), float if dtype is None else dtype).dtype
     placed = place_objects(scene, objects) if placed is None else placed
     grid = solver_grid(scene)
-    parts = [particles_of(one, thing) for one, thing in zip(placed, scene.objects, strict=True)]
+    parts = [
+        particles_of(one, thing, grid) for one, thing in zip(placed, scene.objects, strict=True)
+    ]
     arrangement = arrangement_of(parts, grid, scene.transfer.spline)
     config, model, state = solver_parts(scene, parts, arrangement, dtype)
     stepping = scene.stepping or Fixed()

@@ -1,6 +1,6 @@
 """What is drawn of a scene: Gaussians, which of them move, and the range of their colours."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
@@ -9,9 +9,10 @@ import numpy as np
 
 from jaxphys.gaussians.colour import ColourRange, colour_range, to_unit_interval
 from jaxphys.gaussians.gaussians import Gaussians, concatenate
-from jaxphys.mpm.boundaries import Obstacle
+from jaxphys.mpm.boundaries import Boundary, Obstacle
 from jaxphys.scene.place import Placed
 from jaxphys.scene.placement import Placement
+from jaxphys.scene.solids import drawn_of
 
 
 @partial(
@@ -47,6 +48,16 @@ class Look:
     def objects(self) -> tuple[tuple[int, int], ...]:
         """(start, stop) of each object's moving Gaussians."""
         return tuple(pairwise(np.cumsum([0, *self.counts]).tolist()))
+
+    def following(self, boundaries: tuple[Boundary, ...]) -> "Look":
+        """The same with obstacles where other numbers put them and how these move them, in the
+        shape that they were built with; boundaries: of the simulation after `Simulation.with_`,
+        `simulation.model.boundaries`.
+        """
+        if not self.solids:
+            return self
+        shapes = [gaussians for gaussians, _ in self.solids]
+        return replace(self, solids=tuple(zip(shapes, drawn_of(boundaries), strict=True)))
 
 
 def look_of(

@@ -18,6 +18,7 @@ from jaxphys.core.fields import (
     SPEED,
     Checked,
     between,
+    vector,
 )
 from jaxphys.mpm.boundaries import AnyBoundary, Vector
 from jaxphys.mpm.stepping import Adaptive, Fixed, Stepping
@@ -46,7 +47,8 @@ class Rotation(Checked):
 
 @dataclass(frozen=True)
 class Region(Checked):
-    """A box of an object, at rest, with material parameters of its own.
+    """A box of an object, at rest, with material parameters of its own; particles on its faces are
+    outside, as in boxes of boundaries.
 
     Attributes:
         centre, half_size: in the domain, at time 0 [m].
@@ -160,7 +162,7 @@ class Domain(Checked):
         spacing: of the grid [m].
     """
 
-    size: Vector = field(default=(2.5, 2.5, 2.0), metadata=LENGTH)
+    size: Vector = field(default=(2.5, 2.5, 2.0), metadata=vector(LENGTH))
     spacing: float = field(default=1 / 32, metadata=LENGTH)
 
     def __post_init__(self):

@@ -20,11 +20,12 @@ def solids_of(
     """What is drawn of prepared boundaries: of each obstacle that holds matter out its surface, in
     axes of its own, and the obstacle, which says where these are.
     """
-    return tuple(
-        (surface(one, np.asarray(colour), seed), one.shared())
-        for one in boundaries
-        if isinstance(one, Obstacle) and not one.inside
-    )
+    return tuple((surface(one, np.asarray(colour), seed), one) for one in drawn_of(boundaries))
+
+
+def drawn_of(boundaries: tuple[Boundary, ...]) -> tuple[Obstacle, ...]:
+    """The obstacles among prepared boundaries that are drawn, without what is of particles."""
+    return tuple(one.shared() for one in boundaries if isinstance(one, Obstacle) and not one.inside)
 
 
 def surface(obstacle: Obstacle, colour: np.ndarray, seed: int) -> Gaussians:

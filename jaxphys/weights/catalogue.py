@@ -51,8 +51,12 @@ def find_entry(name: str) -> Entry:
     for entry in CATALOGUE.values():
         if name in (entry.name, *entry.aliases):
             return entry
-    names = [known for entry in CATALOGUE.values() for known in (entry.name, *entry.aliases)]
-    raise InputError(f"weights: unknown name {name!r}; {nearest(name, names)}")
+    raise InputError(f"weights: unknown name {name!r}; {nearest(name, known_names())}")
+
+
+def known_names() -> list[str]:
+    """The names and aliases of all entries."""
+    return [known for entry in CATALOGUE.values() for known in (entry.name, *entry.aliases)]
 
 
 def halved(entry: Entry, files: Sequence[File]) -> tuple[File, ...]:

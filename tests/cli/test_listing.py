@@ -1,6 +1,7 @@
 import json
 
 from jaxphys.cli.listing import materials_text
+from jaxphys.cli.main import run
 from jaxphys.mpm.materials.catalogue import MATERIALS, declared_parameters
 
 
@@ -35,3 +36,9 @@ def test_what_may_be_given_instead_is_listed():
 
 def test_no_line_is_too_long_for_a_terminal():
     assert max(len(line) for line in materials_text().splitlines()) <= 100
+
+
+def test_two_forms_at_once_are_refused(capsys):
+    assert run(["materials", "--json", "--markdown"]) == 2
+    told = capsys.readouterr()
+    assert not told.out and told.err.startswith("jaxphys: --json, --markdown: ask for one")

@@ -101,6 +101,8 @@ def test_an_unknown_name_is_answered_with_the_nearest():
     for command in ("path", "fetch", "verify"):
         with pytest.raises(InputError, match="did you mean 'point-e'"):
             run(command, "point-f")
+        with pytest.raises(InputError, match="did you mean 'point_prior'"):
+            run(command, "point_priors")
 
 
 @pytest.mark.parametrize("arguments", [[], ["list", "net"], ["fetch"], ["remove", "net"]])

@@ -1,7 +1,9 @@
+import gc
 import json
 import os
 import resource
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -61,16 +63,21 @@ def full_disk():
     resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_a_full_disk_is_one_line_and_leaves_the_old_file(tmp_path, full_disk):
+def test_a_full_disk_is_one_line_and_leaves_the_old_file(tmp_path, full_disk, monkeypatch):
     write_json(tmp_path / "a.json", 1)
     with pytest.raises(InputError, match=r"a\.json: cannot be written \(File too large") as error:
         write_json(tmp_path / "a.json", "x" * 10_000)
     assert "\n" not in str(error.value)
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
     assert (tmp_path / "a.json").read_text() == "1\n"
-    picture = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)
-    with pytest.raises(InputError, match=r"a\.png: cannot be written"):
-        write_picture(tmp_path / "a.png", picture)
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", told.append)
+    for side in (38, 64):  # a file that is too large as it is closed, and one before that
+        picture = np.random.default_rng(0).integers(0, 256, (side, side, 3), np.uint8)
+        with pytest.raises(InputError, match=r"a\.png: cannot be written"):
+            write_picture(tmp_path / "a.png", picture)
+    gc.collect()
+    assert not told
     checkpoints = Checkpoints(tmp_path / "steps", "a")
     checkpoints.save(0, {"a": np.zeros(4)})
     with pytest.raises(InputError, match="the checkpoint cannot be saved"):

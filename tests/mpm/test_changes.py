@@ -9,7 +9,9 @@ import pytest
 
 from jaxphys.core.errors import InputError
 from jaxphys.mpm.boundaries import (
+    Cuboid,
     Impulse,
+    Keyframes,
     Plane,
     Release,
     Rotate,
@@ -203,6 +205,10 @@ REFUSED = {
     "frictions few": ({"boundaries": {4: {"frictions": (0.1,) * 5}}}, r"has shape \(5,\)"),
     "frictions bad": ({"boundaries": {4: {"frictions": (-1.0, 0, 0, 0, 0, 0)}}}, "at least 0"),
     "deep": ({"boundaries": {5: {"point": (0.0, 0.0, 0.5)}}}, r"boundaries\[5\]\.point: \d+ part"),
+    "text": ({"velocity": "fast"}, "velocity: expected numbers, found 'fast'"),
+    "text of many": ({"youngs_modulus": ["soft"]}, "youngs_modulus: expected numbers"),
+    "no places": ({"boundaries": [{"point": (0.0, 0.0, 0.1)}]}, "boundaries: give numbers by pl"),
+    "no names": ({"boundaries": {5: 0.2}}, "boundaries: give numbers by place and name"),
 }
 
 
@@ -211,6 +217,18 @@ def test_what_cannot_be_is_refused(built, which):
     changes, message = REFUSED[which]
     with pytest.raises(InputError, match=message):
         built.with_(**changes)
+
+
+def test_known_numbers_of_a_boundary_go_together_as_in_a_file():
+    frames = Keyframes((0.0, 1.0, 2.0), displacements=((0.0, 0.0, 0.0),) * 3)
+    size = {"half_size": (0.1, 0.1, 0.05), "rounding": 0.02}
+    made = simulation((Cuboid((0.4, 0.4, 0.05), **size, friction=0.0, motion=frames),))
+    with pytest.raises(InputError, match=r"boundaries\[0\]\.rounding: .* more than the least"):
+        made.with_(boundaries={0: {"rounding": 0.06}})
+    with pytest.raises(InputError, match=r"boundaries\[0\]\.motion\.times: .*later than the last"):
+        made.with_(boundaries={0: {"motion": {"times": (0.0, 2.0, 1.0)}}})
+    both = made.with_(boundaries={0: {"half_size": (0.1, 0.1, 0.08), "rounding": 0.06}})
+    assert float(both.model.boundaries[0].rounding) == 0.06
 
 
 def test_another_name_of_a_parameter_is_converted():

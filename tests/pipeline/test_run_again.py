@@ -16,7 +16,7 @@ from jaxphys.scene.json import write_scene
 from tests.pipeline.test_animate import small_scene, sphere
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-RESULTS = ("motion.mp4", "metrics.jsonl", "gaussians.ply", "gaussians_1.ply")
+RESULTS = ("motion.mp4", "metrics.jsonl", "gaussians.ply", "gaussians_1.ply", "obstacle_1.ply")
 
 
 @pytest.fixture(scope="module")

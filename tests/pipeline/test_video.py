@@ -1,4 +1,5 @@
 import subprocess
+from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
@@ -6,6 +7,7 @@ import pytest
 from PIL import Image
 
 from jaxphys.core.errors import InputError
+from jaxphys.evaluate.frames import read_frames
 from jaxphys.pipeline.video import ContactSheet, VideoWriter, write_picture
 
 
@@ -40,6 +42,15 @@ def test_pictures_come_back_and_bytes_repeat(tmp_path):
         # Chroma is stored at half resolution: look at the middle of the column.
         assert np.abs(picture[24, 8 * i + 4].astype(int) - (250, 120, 10)).max() < 12
         assert picture[24, (8 * i + 36) % 64].max() < 12
+
+
+@pytest.mark.parametrize("name", ["12:30", "-y", "http:"])
+def test_a_folder_may_have_any_name(name, tmp_path, monkeypatch):
+    """Beginnings of relative paths are options or protocols to the encoder and the decoder."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).mkdir()
+    encode(f"{name}/a.mp4", pictures(2))
+    assert len(read_frames(Path(f"{name}/a.mp4"), 8)) == 2
 
 
 def test_odd_sizes_are_padded(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from jaxphys.core.errors import InputError
 from jaxphys.core.program import parts
 from jaxphys.gaussians.gaussians import covariances, from_points
-from jaxphys.mpm.boundaries import Plane
+from jaxphys.mpm.boundaries import Plane, Translate
 from jaxphys.mpm.loop.frames import advance_frame, rollout_frames
 from jaxphys.mpm.loop.rollout import step
 from jaxphys.mpm.stepping import Adaptive, Fixed
@@ -75,6 +75,66 @@ def test_regions_have_parameters_of_their_own():
     inside = np.asarray(simulation.state.position)[0] > 0.5
     found = np.asarray(simulation.model.parameters["youngs_modulus"])
     assert np.allclose(found, np.where(inside, 3e3, 1e3))
+
+
+@pytest.mark.parametrize("off", [-1e-6, 1e-6])
+def test_a_region_holds_what_a_boundary_with_its_box_holds(off):
+    """What lies on a face is outside of both, to whichever side rounding puts it."""
+    x = np.arange(5.0)
+    lattice = np.stack(np.meshgrid(x, x, x), -1).reshape(-1, 3).astype(np.float32)
+    gaussians = from_points(lattice, np.full((125, 3), 0.5), 0.2)
+    box = {"centre": (0.5, 0.5, 0.5), "half_size": (0.1 + off,) * 3}
+    region = Region(**box, parameters={"youngs_modulus": 3e3})
+    made = scene(regions=(region,), size=0.4, filling=None)
+    made = replace(made, boundaries=(Translate(**box),))
+    simulation, _ = build(made, gaussians)
+    stiff = np.asarray(simulation.model.parameters["youngs_modulus"]) > 2e3
+    assert stiff.sum() == 1
+    np.testing.assert_array_equal(stiff, simulation.model.boundaries[0].chosen)
+
+
+def test_numbers_of_numpy_and_lists_are_those_of_a_file():
+    plain = scene(filling=None)
+    (thing,) = plain.objects
+    centre, size = np.array(thing.centre), np.float32(thing.size)
+    given = replace(thing, centre=centre, size=size, velocity=list(thing.velocity))
+    made = build(replace(plain, objects=[given]), GAUSSIANS)
+    assert scene_from_json(to_json(replace(plain, objects=[given]))).objects[0].size == size
+    for one, other in zip(
+        jax.tree.leaves(made.simulation.state),
+        jax.tree.leaves(build(plain, GAUSSIANS).simulation.state),
+        strict=True,
+    ):
+        np.testing.assert_allclose(one, other, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "changes, told",
+    [
+        ({"size": np.float32("nan")}, r"^objects\[0\]\.size: nan is not a finite"),
+        ({"centre": np.array([0.5, np.inf, 0.5])}, r"^objects\[0\]\.centre\[1\]: inf"),
+        ({"centre": (0.5, 0.5)}, r"^objects\[0\]\.centre: expected a list of 3"),
+        ({"material": None}, r"^objects\[0\]\.material: expected a text"),
+        ({"parameters": {"density": "light"}}, r"^objects\[0\]\.parameters\.density: expected a"),
+    ],
+)
+def test_what_no_file_could_hold_is_told_by_its_field(changes, told):
+    made = scene()
+    with pytest.raises(InputError, match=told):
+        build(replace(made, objects=(replace(made.objects[0], **changes),)), GAUSSIANS)
+
+
+def test_texts_and_truths_are_no_numbers():
+    for make in (lambda: Object(size="1"), lambda: Domain(spacing=True), lambda: Adaptive("8")):
+        with pytest.raises(InputError, match="expected a number, found"):
+            make()
+    with pytest.raises(InputError, match=r"^size: expected 3 values"):
+        Domain(size=(1.0, 1.0))
+
+
+def test_a_path_is_no_set_of_gaussians():
+    with pytest.raises(InputError, match=r"^build: objects\[0\] is 'a.ply'; .*jaxphys.load"):
+        build(scene(), "a.ply")
 
 
 def test_only_what_is_inside_the_area_moves():

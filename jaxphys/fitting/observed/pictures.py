@@ -89,8 +89,8 @@ class Seen(Observed):
         """
 
         def of_frame(parts):
-            position, deformation, time, status = parts
-            frame = Frame(position, deformation, time, status, motion.carriers)
+            position, deformation, time, status, body = parts
+            frame = Frame(position, deformation, time, status, motion.carriers, body)
 
             def of_camera(camera):
                 image = draw(look, frame, camera, background=self.background, capacity=capacity)
@@ -100,7 +100,7 @@ class Seen(Observed):
 
             return jax.lax.map(of_camera, cameras)
 
-        parts = (motion.position, motion.deformation, motion.time, motion.status)
+        parts = (motion.position, motion.deformation, motion.time, motion.status, motion.body)
         return jax.lax.map(of_frame, parts)
 
     def residuals(self, motion, look, data, capacity: int = 0) -> Array:

@@ -24,6 +24,7 @@ from jaxphys.core.fields import (
     between,
     check_value,
     direction,
+    numbers_of,
     unit,
     vector,
 )
@@ -66,10 +67,12 @@ class Setting:
     volume: np.ndarray | Array
     dtype: np.dtype
 
-    def in_box(self, centre: Array, half_size: Array) -> Array:
-        """Which particles start inside a box, (N,) bool; those on its faces do not."""
+    def in_box(self, centre: Any, half_size: Any) -> Any:
+        """Which particles start inside a box, (N,) bool; those on its faces do not. Of arrays of
+        numpy alone it is one of numpy.
+        """
         reach = half_size - ON_EDGE * self.grid.spacing
-        return jnp.all(jnp.abs(self.rest - centre) < reach, axis=1)
+        return (abs(self.rest - centre) < reach).all(axis=1)
 
 
 class Numbers(Checked):
@@ -108,7 +111,7 @@ class Numbers(Checked):
 
         Raises:
             InputError: a field that does not exist, chooses code, or is left out of the program; a
-                wrong shape; a known number out of range.
+                wrong shape; a known number out of range, or known numbers that do not go together.
         """
         numbers = {
             entry.name: entry
@@ -129,7 +132,20 @@ class Numbers(Checked):
                 made[name] = _changed_part(name, now, value)
                 continue
             made[name] = changed_number(name, now, value, numbers[name].metadata)
-        return replace(self, **made)
+        changed = replace(self, **made)
+        changed._check_together()
+        return changed
+
+    def _check_together(self) -> None:
+        """What `__post_init__` checks of numbers, of prepared ones where all of them are known."""
+        values = {
+            entry.name: getattr(self, entry.name)
+            for entry in fields(self)
+            if entry.metadata.get("keys") != ()
+        }
+        if not any(isinstance(part, jax.core.Tracer) for part in jax.tree.leaves(values)):
+            arrays = {name: one for name, one in values.items() if isinstance(one, jax.Array)}
+            type(self)(**values | {name: plain(np.asarray(one)) for name, one in arrays.items()})
 
     @staticmethod
     def _check_shape(entry, value: Array) -> None:
@@ -244,8 +260,7 @@ class Boundary(Numbers):
 def changed_number(name: str, now: Array, value: Any, rules: Mapping[str, Any]) -> Array:
     """`value` in place of the number `now`, checked by the rules of its field where it is known."""
     if not any(isinstance(part, jax.core.Tracer) for part in jax.tree.leaves(value)):
-        known = np.asarray(value, np.float64)
-        check_value(name, plain(known), rules)
+        check_value(name, plain(numbers_of(name, value)), rules)
     array = jnp.asarray(value, now.dtype)
     if array.shape != now.shape:
         raise InputError(f"{name}: has shape {array.shape}; give {now.shape}")

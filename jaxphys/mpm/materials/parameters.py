@@ -11,6 +11,7 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.fields import numbers_of
 
 
 @dataclass(frozen=True)
@@ -93,7 +94,7 @@ def check_parameter(parameter: Parameter, value, where: str) -> None:
     Raises:
         InputError: with `where`, the first entry that does, and the range.
     """
-    values = np.asarray(value, dtype=np.float64).reshape(-1)
+    values = numbers_of(f"{where}: {parameter.name}", value).reshape(-1)
     wrong = np.flatnonzero(~parameter.contains(values))
     if wrong.size:
         entry = f"[{wrong[0]}]" if values.size > 1 else ""
