@@ -1,0 +1,241 @@
+"""Contact between objects with a velocity field each: what it does at a node, in a step, and
+however that is computed. In float64 unless said.
+"""
+
+from dataclasses import replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxphys.core.errors import InputError
+from jaxphys.mpm.boundaries import Plane, Setting, prepare
+from jaxphys.mpm.loop.halo import sent_bytes
+from jaxphys.mpm.loop.implicit.step import check_implicit
+from jaxphys.mpm.loop.placement import Placement, Slabs
+from jaxphys.mpm.loop.rollout import rollout
+from jaxphys.mpm.loop.window import windowed
+from jaxphys.mpm.meeting import meet
+from jaxphys.mpm.state import OK
+from jaxphys.mpm.transfer.schemes import AFLIP, Transfer
+
+from .cases import block, long_block, public
+from .test_conservation import angular_momentum, free
+from .test_forward_mode import agree, both_directions, direction_of, loss_by
+from .test_placement import same
+
+LIGHTEST = 1e-12
+X, Y, Z = np.eye(3)
+
+
+def halves(normal=X, offset=0.0, density=(1.0, 1.0), size=7, gap=0.0):
+    """Masses (2, n, n, n) that a lattice of particles gives to nodes, by quadratic B-splines: two
+    half-spaces that touch at a plane, or have `gap` [cells] between them.
+    """
+    line = (np.arange(3 * (size + 4)) + 0.5) / 3 - (size + 3) / 2
+    points = np.stack(np.meshgrid(line, line, line, indexing="ij"), -1).reshape(-1, 3)
+    away, nodes = points @ normal - offset, np.arange(size) - (size - 1) / 2
+
+    def seen(own):
+        d = np.abs(points[own][:, :, None] - nodes)
+        w = np.where(d < 0.5, 0.75 - d**2, 0.5 * np.maximum(1.5 - d, 0) ** 2)
+        return np.einsum("pi,pj,pk->ijk", w[:, 0], w[:, 1], w[:, 2], optimize=True)
+
+    return np.stack([density[0] * seen(away < -gap / 2), density[1] * seen(away > gap / 2)])
+
+
+def after(mass, velocity, friction=None):
+    friction = None if friction is None else jnp.asarray(friction)
+    return np.asarray(meet(jnp.asarray(mass), jnp.asarray(velocity), LIGHTEST, friction))
+
+
+def everywhere(mass, *vectors):
+    """Velocities (3, K, ...) that are the same all over each object."""
+    shape = mass.shape[1:]
+    return np.stack([np.broadcast_to(v[:, None, None, None], (3, *shape)) for v in vectors], 1)
+
+
+def shared_nodes(mass):
+    return (mass > LIGHTEST).all(axis=0)
+
+
+def test_two_that_approach_go_on_together_along_the_normal_and_as_they_were_beside_it():
+    mass = halves(offset=0.1, density=(1.0, 3.0))
+    velocity = everywhere(mass, np.array([1.0, 0.5, 0.0]), np.array([-1.0, 0.0, 0.2]))
+    found, shared = after(mass, velocity), shared_nodes(mass)
+    common = (mass[0] - mass[1]) / (mass[0] + mass[1])
+    for k in (0, 1):
+        np.testing.assert_allclose(found[0, k][shared], common[shared], atol=1e-14)
+        np.testing.assert_allclose(found[1:, k], velocity[1:, k], atol=1e-14)
+        np.testing.assert_array_equal(found[:, k][:, ~shared], velocity[:, k][:, ~shared])
+    assert shared.any() and not shared.all()
+
+
+def test_two_that_part_are_left_alone():
+    mass = halves()
+    velocity = everywhere(mass, np.array([-1.0, 0.5, 0.0]), np.array([1.0, 0.0, 0.2]))
+    np.testing.assert_array_equal(after(mass, velocity, friction=0.5), velocity)
+
+
+@pytest.mark.parametrize(("friction", "left"), [(0.25, 0.5), (0.5, 0.0), (2.0, 0.0)])
+def test_sliding_is_slowed_as_coulomb_has_it(friction, left):
+    """Normal 2 m/s lost, sliding 1 m/s: friction takes 2 mu of it, and no more than there is."""
+    mass = halves(density=(1.0, 2.0))
+    velocity = everywhere(mass, X + 0.6 * Y, -X - 0.8 * Z)
+    found, shared = after(mass, velocity, friction), shared_nodes(mass)
+    relative = (found[:, 0] - found[:, 1])[:, shared]
+    np.testing.assert_allclose(
+        relative, left * (0.6 * Y + 0.8 * Z)[:, None] + 0 * relative, atol=1e-14
+    )
+
+
+@pytest.mark.parametrize("density", [(1.0, 1.0), (1.0, 1e4), (1e4, 1.0)])
+def test_the_normal_is_that_of_the_surface_between_them_whatever_they_weigh(density):
+    normal = np.array([2.0, 1.0, 0.5]) / 5.25**0.5
+    mass = halves(normal, 0.2, density)
+    velocity = everywhere(mass, normal, -normal)
+    # Not at the ends, beyond which there is no mass.
+    gained = (mass[0] * (after(mass, velocity) - velocity)[:, 0])[:, 1:-1, 1:-1, 1:-1].reshape(
+        3, -1
+    )
+    impulse = gained.sum(axis=1) / np.linalg.norm(gained.sum(axis=1))
+    assert -impulse @ normal > np.cos(np.radians(3))
+    each = gained / np.maximum(np.linalg.norm(gained, axis=0), 1e-30)
+    spread = np.average(-normal @ each, weights=np.linalg.norm(gained, axis=0))
+    assert spread > np.cos(np.radians(8))
+
+
+def test_what_bounds_both_alike_has_no_part_in_the_normal():
+    mass = halves() * np.array([0.1, 0.7, 1.0, 1.0, 1.0, 0.7, 0.1])[:, None]
+    velocity = everywhere(mass, X, -X)
+    lost = velocity - after(mass, velocity)
+    # Of each node, at the sides as in the middle, and along the bar alone.
+    assert np.abs(lost[1:]).max() < 1e-14
+    assert (np.abs(lost[0]).max(axis=(0, 1)) > 0.9).all()
+
+
+def test_objects_touch_at_their_surfaces_and_not_where_their_kernels_end():
+    def meets(gap):
+        mass = halves(gap=gap)
+        velocity = everywhere(mass, X, -X)
+        return shared_nodes(mass).any(), (after(mass, velocity) != velocity).any()
+
+    assert meets(0.0) == (True, True)
+    assert meets(1.0) == (True, False)
+
+
+def test_many_at_a_node_keep_momentum_and_gain_no_energy():
+    random = np.random.default_rng(0)
+    mass = 0.1 + random.random((4, 5, 5, 5))
+    velocity = random.normal(size=(3, 4, 5, 5, 5))
+    for friction in (None, 0.3):
+        found = after(mass, velocity, friction)
+        assert np.abs(found - velocity).max() > 0.1
+        np.testing.assert_allclose(
+            np.sum(mass * found, axis=1), np.sum(mass * velocity, axis=1), atol=1e-14
+        )
+        energy, before = (np.sum(mass * v**2, axis=(0, 1)) for v in (found, velocity))
+        assert (energy <= before * (1 + 1e-14)).all()
+
+
+def apart(scene, fields=2, friction=0.3):
+    """A scene whose particles belong to one object after the other."""
+    config, model, state = scene
+    field = jnp.arange(config.particles, dtype=jnp.int32) % fields
+    friction = jnp.asarray(friction, model.mass.dtype)
+    return replace(config, fields=fields), replace(model, field=field, friction=friction), state
+
+
+def end(config, model, state, steps=4):
+    state = jax.jit(partial(rollout, config, dt=5e-4, steps=steps))(model, state)
+    assert int(state.status.code) == OK
+    return state
+
+
+def test_momentum_and_angular_momentum_are_kept():
+    config, model, state = apart(block(), 3)
+    model = replace(model, gravity=None)
+    x, v, C, _ = public(state)
+    scale = float(jnp.sum(model.mass) * jnp.abs(v).max())
+    moments = [jnp.sum(model.mass[:, None] * v, axis=0)]
+    moments.append(angular_momentum(config.grid, model.mass, x, v, C))
+    last = end(config, model, state)
+    x, v, C, _ = public(last)
+    np.testing.assert_allclose(
+        jnp.sum(model.mass[:, None] * v, axis=0), moments[0], atol=1e-13 * scale
+    )
+    np.testing.assert_allclose(
+        angular_momentum(config.grid, model.mass, x, v, C), moments[1], atol=1e-13 * scale
+    )
+    # Control: it does something.
+    one = end(replace(config, fields=1), free(model), state)
+    assert float(jnp.abs(one.velocity - last.velocity).max()) > 1e-3
+
+
+def test_far_from_each_other_each_moves_as_it_would_alone():
+    config, model, state = block(shape=(22, 10, 11))
+    second = jnp.arange(config.particles) % 2
+    state = state._replace(position=state.position.at[0].add(1.0 * second))
+    one = end(config, model, state)
+    two = end(*apart((config, model, state)))
+    same(two, one, 1e-13)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "way", "small"),
+    [
+        (jnp.float64, {"placement": Placement(1, 16), "window": (8, 8, 8)}, 1e-13),
+        (jnp.float32, {"placement": Placement(4, 16), "window": (8, 8, 8)}, 2e-6),
+    ],
+    ids=["in chunks, in a window", "on four devices, float32"],
+)
+def test_however_it_is_computed(dtype, way, small):
+    if way["placement"].devices > jax.device_count():
+        pytest.skip("needs four host devices: see tests/conftest.py")
+    config, model, state = apart(block(dtype=dtype), 3)
+    setting = Setting(config.grid, np.asarray(state.position.T), model.volume, np.dtype(dtype))
+    floor = Plane((0.0, 0.0, 0.3), friction=0.4, acts_on="nodes")
+    model = replace(model, boundaries=prepare((floor,), setting))
+    found, whole = (end(one, model, state) for one in (replace(config, **way), config))
+    same(found._replace(residual=None), whole._replace(residual=None), small)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        pytest.param({"window": (8, 8, 8)}, id="window"),
+        pytest.param(
+            {"transfer": Transfer(AFLIP(0.9), "cubic")}, marks=pytest.mark.slow, id="cubic AFLIP"
+        ),
+    ],
+)
+def test_both_directions_of_its_derivative(options):
+    config, model, state = apart(block(count=40))
+    loss, numbers = loss_by(replace(config, **options), model, state)
+    agree(*both_directions(loss, numbers, direction_of(numbers)))
+
+
+def test_devices_share_the_window_as_a_whole():
+    config, _, state = apart(long_block(devices=4))
+    if jax.device_count() < 4:
+        pytest.skip("needs four host devices: see tests/conftest.py")
+    alone = replace(config, fields=1)
+    assert windowed(alone, state, slabs=True).slabs is not None
+    assert windowed(config, state, slabs=True).slabs is None
+    assert sent_bytes(config) == 2 * sent_bytes(alone)
+    with pytest.raises(InputError, match="2 velocity fields every device has the window as"):
+        replace(config, slabs=Slabs(20, (8,)))
+
+
+def test_what_does_not_go_together_is_refused():
+    config, model, state = apart(block())
+    with pytest.raises(InputError, match="contact between objects needs explicit steps"):
+        check_implicit(config, model)
+    for wrong in (replace(config, fields=1), replace(config, fields=2)):
+        field = None if wrong.fields == 2 else model.field
+        with pytest.raises(InputError, match=r"Model\.field does not fit Config\.fields"):
+            rollout(wrong, replace(model, field=field), state, dt=1e-4, steps=1)
+    with pytest.raises(InputError, match=r"Config\.fields is 0"):
+        replace(config, fields=0)
