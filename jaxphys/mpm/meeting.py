@@ -7,10 +7,14 @@ approach are brought to a common velocity along the normal, as much of their sli
 as Coulomb's law allows, and two that part are left alone. It is an impulse between equals: what one
 gains the other loses, at the same node, so that momentum and angular momentum stay.
 
-With several at one node, pairs come one after the other. In order that momentum stays, the normal
-must be the same for both: the gradient of the log of the ratio of what a node holds of either. Each
-is counted in units of its own fullest node first, and then, with the normal that follows, of what
-it has a cell further inside, in which the sides that it has elsewhere have less of a part.
+With several at one node, pairs come one after the other.
+
+In order that momentum stays, the normal must be the same for both, though each sees its own: the
+direction in which its mass falls off, averaged over where the other one is. At the edge of a block
+that lies on a slab these differ. The block's falls off forwards as well, and with a normal that
+leans forwards a block that slides would be driven into the slab, and braked. The slab's points up
+all around. So the one that varies less around a node counts: each in inverse proportion to the
+square of its variation, so that two that are alike are averaged.
 
 A kernel reaches further than matter does, so that two objects share nodes while they are still two
 cells apart. They touch where a node is full, which is where these shares add up to `TOUCH`. That
@@ -29,10 +33,7 @@ from jaxphys.core.fields import NON_NEGATIVE, Checked
 from jaxphys.mpm.boundaries.contact import shortened
 
 TOUCH = 0.9
-PASSES = 3  # of finding normals
-# Of both, beside what a node holds of either: with it the log of their ratio is in proportion to
-# the distance from the surface between them, to a tenth, wherever they share nodes.
-FLOOR = 0.01
+EVEN = 0.01  # variation of a direction, 1 - |mean of unit vectors|, that is as good as none
 
 
 @dataclass(frozen=True)
@@ -56,18 +57,18 @@ def meet(mass: Array, velocity: Array, lightest: Array, friction: Array | None) 
     """
     there = mass > lightest
     shares = mass / jnp.maximum(jnp.max(mass, axis=(1, 2, 3), keepdims=True), lightest)
-    before, after = jnp.stack([jnp.stack(_beside(mass, axis)) for axis in (1, 2, 3)], axis=1)
+    before, after = jnp.stack([jnp.stack(_beside(shares, axis)) for axis in (1, 2, 3)], axis=1)
+    slopes = after - before
     first, second = np.triu_indices(len(mass), 1)
 
     def pair(velocity, which):
         a, b = which
-        of_a, of_b = shares[a], shares[b]
-        for _ in range(PASSES):
-            normal = _normal(of_a, of_b)
-            inwards = normal > 0
-            of_a = _share(mass[a], normal, jnp.where(inwards, before[:, a], after[:, a]))
-            of_b = _share(mass[b], normal, jnp.where(inwards, after[:, b], before[:, b]))
-        touching = there[a] & there[b] & (of_a + of_b >= TOUCH)
+        normal = _normal(shares[a], shares[b], slopes[:, a], slopes[:, b])
+        inwards = normal > 0
+        full = _share(shares[a], normal, jnp.where(inwards, before[:, a], after[:, a])) + _share(
+            shares[b], normal, jnp.where(inwards, after[:, b], before[:, b])
+        )
+        touching = there[a] & there[b] & (full >= TOUCH)
         lost = _lost(velocity[:, a] - velocity[:, b], normal, friction)
         share = jnp.where(touching, 1 / jnp.where(touching, mass[a] + mass[b], 1), 0)
         gained = -mass[b] * share * lost, mass[a] * share * lost
@@ -89,27 +90,40 @@ def _lost(relative: Array, normal: Array, friction: Array | None) -> Array:
     return lost + shortened(relative - along * normal, friction * closing)
 
 
-def _normal(first: Array, second: Array) -> Array:
+def _normal(first: Array, second: Array, of_first: Array, of_second: Array) -> Array:
     """Unit normals (3, nx, ny, nz) from one object to another; 0 where there is no direction.
 
-    first, second: what the nodes hold of each, over what its fullest node holds.
+    first, second: what the nodes hold of each; of_first, of_second: how that grows on each axis.
     """
-    both = first + second
-    there = both > 0
-    floor = FLOOR * jnp.where(there, both, 1)
-    distance = jnp.log((second + floor) / (first + floor))
-    slopes = []
-    for axis in (0, 1, 2):
-        # A node with neither of them tells nothing.
-        before, after = (
-            jnp.where(known, value, distance)
-            for value, known in zip(_beside(distance, axis), _beside(there, axis), strict=True)
-        )
-        slopes.append(after - before)
-    slope = jnp.stack(slopes)
-    square = jnp.sum(slope**2, axis=0)
-    steep = square > 0
-    return slope * jnp.where(steep, jax.lax.rsqrt(jnp.where(steep, square, 1)), 0)
+    out_of_first, weight = _facing(second, -of_first)
+    into_second, other_weight = _facing(first, of_second)
+    return _unit(weight * out_of_first + other_weight * into_second)[0]
+
+
+def _facing(there: Array, slope: Array) -> tuple[Array, Array]:
+    """The mean direction (3, ...) around each node of an object's slope, as far as another object
+    is there, and what it counts, (...): the more, the less it varies.
+    """
+    direction, of_mean = _unit(_around(there * slope))
+    mean = _around(there * _unit(slope)[1])
+    varies = 1 - of_mean / jnp.where(mean > 0, mean, 1)
+    return direction, 1 / (varies**2 + EVEN**2)
+
+
+def _unit(vectors: Array) -> tuple[Array, Array]:
+    """Vectors (3, ...) over their lengths, and the lengths (...); 0 where there is no direction."""
+    square = jnp.sum(vectors**2, axis=0)
+    some = square > 0
+    inverse = jnp.where(some, jax.lax.rsqrt(jnp.where(some, square, 1)), 0)
+    return vectors * inverse, square * inverse
+
+
+def _around(nodes: Array) -> Array:
+    """Means (..., nx, ny, nz) over each node and its neighbours, a half and a quarter an axis."""
+    for axis in (-3, -2, -1):
+        before, after = _beside(nodes, axis)
+        nodes = nodes / 2 + (before + after) / 4
+    return nodes
 
 
 def _share(mass: Array, normal: Array, inner: Array) -> Array:
@@ -123,6 +137,7 @@ def _share(mass: Array, normal: Array, inner: Array) -> Array:
 
 def _beside(nodes: Array, axis: int) -> tuple[Array, Array]:
     """Values at the nodes before and after each along an axis; 0 beyond the ends."""
+    axis %= nodes.ndim
     count = nodes.shape[axis]
     padded = jnp.pad(nodes, [(1, 1) if a == axis else (0, 0) for a in range(nodes.ndim)])
     before, after = (
