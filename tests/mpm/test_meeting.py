@@ -30,20 +30,28 @@ LIGHTEST = 1e-12
 X, Y, Z = np.eye(3)
 
 
-def halves(normal=X, offset=0.0, density=(1.0, 1.0), size=7, gap=0.0):
-    """Masses (2, n, n, n) that a lattice of particles gives to nodes, by quadratic B-splines: two
-    half-spaces that touch at a plane, or have `gap` [cells] between them.
+def nodes_of(*insides, size=7):
+    """Masses (K, n, n, n) that a lattice of particles gives to nodes around the origin by quadratic
+    B-splines, of objects that hold the points (N, 3) [cells] where `inside` says so.
     """
     line = (np.arange(3 * (size + 4)) + 0.5) / 3 - (size + 3) / 2
     points = np.stack(np.meshgrid(line, line, line, indexing="ij"), -1).reshape(-1, 3)
-    away, nodes = points @ normal - offset, np.arange(size) - (size - 1) / 2
+    nodes = np.arange(size) - (size - 1) / 2
 
     def seen(own):
         d = np.abs(points[own][:, :, None] - nodes)
         w = np.where(d < 0.5, 0.75 - d**2, 0.5 * np.maximum(1.5 - d, 0) ** 2)
         return np.einsum("pi,pj,pk->ijk", w[:, 0], w[:, 1], w[:, 2], optimize=True)
 
-    return np.stack([density[0] * seen(away < -gap / 2), density[1] * seen(away > gap / 2)])
+    return np.stack([seen(inside(points)) for inside in insides])
+
+
+def halves(normal=X, offset=0.0, density=(1.0, 1.0), gap=0.0):
+    """Of two half-spaces that touch at a plane, or have `gap` [cells] between them."""
+    mass = nodes_of(
+        lambda x: x @ normal - offset < -gap / 2, lambda x: x @ normal - offset > gap / 2
+    )
+    return mass * np.reshape(density, (2, 1, 1, 1))
 
 
 def after(mass, velocity, friction=None):
@@ -114,6 +122,22 @@ def test_what_bounds_both_alike_has_no_part_in_the_normal():
     # Of each node, at the sides as in the middle, and along the bar alone.
     assert np.abs(lost[1:]).max() < 1e-14
     assert (np.abs(lost[0]).max(axis=(0, 1)) > 0.9).all()
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.4), (0.5, 0.0), (0.3, 0.2)])
+def test_the_edge_of_a_block_has_no_part_in_the_normal_of_the_slab_that_it_slides_on(place):
+    """A node of the block's front edge sees mass fall off forwards and down: a normal in between,
+    some 30 degrees off, brakes a block that slides as fast as it is pressed on.
+    """
+    edge, top = place
+    mass = nodes_of(
+        lambda x: (x[:, 0] < edge) & (x[:, 2] > top),
+        lambda x: (x[:, 2] < top) & (x[:, 2] > top - 2),
+    )
+    velocity = everywhere(mass, X - Z, 0 * X)
+    impulse = (mass[0] * (after(mass, velocity) - velocity)[:, 0])[:, :, 3]
+    x, _, z = impulse.sum(axis=(1, 2))
+    assert z > 1 and abs(x) < 0.01 * z
 
 
 def test_objects_touch_at_their_surfaces_and_not_where_their_kernels_end():
