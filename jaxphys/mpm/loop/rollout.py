@@ -265,8 +265,8 @@ def matter_of(config, model, segments, order) -> tuple[Matter, ...]:
         mass, volume, load = cut((model.mass, model.volume, loads), into, order, empty=True)
         parameters = law.prepare({name: model.parameters[name] for name in law.parameters})
         # What is left over moves with the particle that it repeats, lest it stray from the window.
-        field = cut(model.field, into, order)
-        found.append(Matter(mass, volume, cut(parameters, into, order), load, field))
+        parameters, field = cut((parameters, model.field), into, order)
+        found.append(Matter(mass, volume, parameters, load, field))
     return tuple(found)
 
 
