@@ -166,14 +166,13 @@ def test_many_at_a_node_keep_momentum_and_gain_no_energy():
     random = np.random.default_rng(0)
     mass = 0.1 + random.random((4, 5, 5, 5))
     velocity = random.normal(size=(3, 4, 5, 5, 5))
-    for friction in (None, 0.3):
-        found = after(mass, velocity, friction)
-        assert np.abs(found - velocity).max() > 0.1
-        np.testing.assert_allclose(
-            np.sum(mass * found, axis=1), np.sum(mass * velocity, axis=1), atol=1e-14
-        )
-        energy, before = (np.sum(mass * v**2, axis=(0, 1)) for v in (found, velocity))
-        assert (energy <= before * (1 + 1e-14)).all()
+    found = after(mass, velocity, friction=0.3)
+    assert np.abs(found - velocity).max() > 0.1
+    np.testing.assert_allclose(
+        np.sum(mass * found, axis=1), np.sum(mass * velocity, axis=1), atol=1e-14
+    )
+    energy, before = (np.sum(mass * v**2, axis=(0, 1)) for v in (found, velocity))
+    assert (energy <= before * (1 + 1e-14)).all()
 
 
 def test_its_derivative_forward_and_back_is_the_difference():
