@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from jaxphys.core.errors import InputError
+from jaxphys.core.program import parts
 from jaxphys.mpm.boundaries import Plane, Setting, prepare
 from jaxphys.mpm.loop.halo import sent_bytes
 from jaxphys.mpm.loop.implicit.step import check_implicit
@@ -232,6 +233,12 @@ def test_momentum_and_angular_momentum_are_kept():
     np.testing.assert_allclose(turned, turning, atol=1e-13 * scale)
     # Control: they exchange it.
     assert float(jnp.abs(after - before).max()) > 1e-2 * scale
+
+
+def test_boundaries_that_act_on_its_nodes_are_told():
+    config, *given = three_above_a_floor(0.3)
+    found = parts(program(config, 4), *given)
+    assert {"contact between objects", "boundary 0 plane"} <= set(found)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,9 @@ import jax
 import numpy as np
 import pytest
 
+from jaxphys.mpm.loop.adaptive import rollout_adaptively
 from jaxphys.mpm.loop.rollout import rollout
+from jaxphys.mpm.stepping import Adaptive
 from jaxphys.problems.catalogue import PROBLEMS
 from jaxphys.problems.colliding import Bars, meeting, parted
 from jaxphys.problems.discrete import solve
@@ -91,3 +93,16 @@ def test_what_sticks_does_not_creep():
     assert int(state.status.code) == 0
     times = some * problem.dt * np.arange(40)
     assert abs(np.polyfit(times, moved[40:], 1)[0]) < 0.01 * problem.spacing
+
+
+@pytest.mark.slow
+def test_steps_that_adapt_slide_as_far():
+    """Two that go on together have no mode that is faster than either has: the bounds hold."""
+    problem = stacked(Stack(), 2)
+    duration = problem.dt * problem.steps
+    end, steps = rollout_adaptively(
+        problem.config, problem.model, problem.state, Adaptive(), duration=duration
+    )
+    assert int(end.status.code) == 0 and int(steps.count) > 20
+    fixed = slid(problem, solve(problem))
+    assert slid(problem, end) == pytest.approx(fixed, rel=0.02)

@@ -148,9 +148,8 @@ def at_nodes(config: Config, shared: Shared, rows: Array, fixed: Fixed) -> Array
             velocity = rows.T[:3].reshape(3, *apart)
             velocity = meet(given[:, 3].reshape(apart), velocity, lightest, shared.friction)
             rows = jnp.concatenate([velocity.reshape(3, -1), rows.T[3:]]).T
-        return None, jax.vmap(held)(rows.reshape(config.fields, -1, config.columns)).reshape(
-            rows.shape
-        )
+        each = rows.reshape(config.fields, -1, config.columns)
+        return None, jax.lax.map(held, each).reshape(rows.shape)
 
     if config.slabs is not None:
         updated = spread(config.placement, updated, lambda nothing: nothing)
