@@ -105,4 +105,4 @@ def test_steps_that_adapt_slide_as_far():
     )
     assert int(end.status.code) == 0 and int(steps.count) > 20
     fixed = slid(problem, solve(problem))
-    assert slid(problem, end) == pytest.approx(fixed, rel=0.02)
+    assert slid(problem, end) == pytest.approx(fixed, rel=0.05)
