@@ -13,7 +13,15 @@ import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError, nearest
-from jaxphys.core.fields import PLACE, RATE, SPEED, between, check_number, numbers_of
+from jaxphys.core.fields import (
+    NON_NEGATIVE,
+    PLACE,
+    RATE,
+    SPEED,
+    between,
+    check_number,
+    numbers_of,
+)
 from jaxphys.mpm.boundaries import Setting
 from jaxphys.mpm.materials.parameters import Parameter, check_parameter
 from jaxphys.mpm.state import Config, Model, State, refuse_inverted
@@ -192,6 +200,25 @@ def _spinning(model: Model, state: State, layout: Layout, spin: Any, *, drifts: 
     )
 
 
+def with_friction(model: Model, layout: Layout, friction: Any) -> Model:
+    """The model with another friction between its objects, if there is any between them.
+
+    Raises:
+        InputError: nothing here has friction; or it is out of range or no number.
+    """
+    if model.friction is None:
+        if not any(boundary.rough for boundary in model.boundaries):
+            raise InputError(
+                "with_: no boundary here has friction, nor has contact between objects; build one "
+                "with friction above 0"
+            )
+        return model
+    made = layout.array("friction", friction, NON_NEGATIVE)
+    if made.shape != ():
+        raise InputError(f"with_: friction has shape {made.shape}; give one number")
+    return replace(model, friction=made)
+
+
 def with_boundaries(
     boundaries: tuple,
     setting: Setting,
@@ -214,12 +241,7 @@ def with_boundaries(
             "with_: boundaries: give numbers by place and name, such as {0: {'friction': 0.2}}"
         )
     if friction is not None:
-        rough = [index for index, boundary in enumerate(made) if boundary.rough]
-        if not rough:
-            raise InputError(
-                "with_: no boundary here has friction; build one with friction above 0"
-            )
-        for index in rough:
+        for index in [index for index, boundary in enumerate(made) if boundary.rough]:
             made[index] = _with_numbers(made[index], index, {"friction": friction})
     for index, values in changes.items():
         if index not in range(len(made)):

@@ -18,6 +18,7 @@ from jaxphys.mpm.changes import (
     is_traced,
     parameter,
     with_boundaries,
+    with_friction,
     with_parameters,
     with_start,
 )
@@ -148,7 +149,8 @@ class Simulation:
             deformation: gradients F at the start, with det F > 0, (3, 3) or (N, 3, 3).
             gravity: (3,) [m/s^2].
             density: [kg/m^3], a number or (N,).
-            friction: Coulomb's coefficient of every boundary that has one.
+            friction: Coulomb's coefficient of every boundary that has one, and between objects if
+                their contact has.
             boundaries: other numbers of single boundaries, by their place in the scene's list, such
                 as `{0: {"point": (0.0, 0.0, 0.2)}}`. Where these say which particles are meant,
                 they are chosen anew; a choice has no slope, so it adds nothing to a gradient. Drawn
@@ -171,6 +173,8 @@ class Simulation:
         model = with_parameters(self.config, model, layout, parameters, NAMES)
         start = (position, velocity, spin, affine, deformation)
         state = with_start(self.config, model, state, layout, *start)
+        if friction is not None:
+            model = with_friction(model, layout, friction)
         setting = Setting(self.config.grid, state.position.T, model.volume, layout.dtype)
         moved = position is not None
         listed = with_boundaries(model.boundaries, setting, boundaries or {}, friction, moved)

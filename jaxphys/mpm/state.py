@@ -52,6 +52,8 @@ class Config:
         transfer: how particles and grid exchange velocities, and with which kernel.
         slabs: how devices share the window, or None where each has all of it. A slab follows the
             particles of its device; if they outgrow it, the status says so.
+        fields: how many velocity fields the grid has: one, or one for each object
+            (`Model.field`), where objects meet by contact (`mpm.meeting`).
     """
 
     grid: Grid
@@ -63,6 +65,7 @@ class Config:
     placement: Placement = Placement()
     transfer: Transfer = Transfer()
     slabs: Slabs | None = None
+    fields: int = 1
 
     def __post_init__(self):
         reached = 0
@@ -87,6 +90,13 @@ class Config:
             raise InputError(
                 f"Config.window is {self.window}: it must lie between {width} nodes and the grid's "
                 f"{self.grid.shape} on each axis."
+            )
+        if self.fields < 1:
+            raise InputError(f"Config.fields is {self.fields}: give at least 1.")
+        if self.fields > 1 and self.slabs is not None:
+            raise InputError(
+                f"Config.slabs: with {self.fields} velocity fields every device has the window as "
+                "a whole; set it to None."
             )
         if self.slabs is not None:
             most = (self.window or self.grid.shape)[0]
@@ -125,6 +135,11 @@ class Config:
         """Shape of the part of the grid that a device computes."""
         shape = self.window or self.grid.shape
         return shape if self.slabs is None else (self.slabs.planes, *shape[1:])
+
+    @property
+    def rows(self) -> int:
+        """Rows of numbers that a device has: one for each node of each field."""
+        return self.fields * self.computed.nodes
 
     @property
     def parts(self) -> int:
@@ -170,7 +185,9 @@ class Model:
     mass: (N,) [kg]; volume: (N,) rest volume [m^3]; parameters: name -> (N,), as the laws name
     them; gravity: (3,) [m/s^2], or None for none, which no step then adds; boundaries: as
     `boundaries.prepare` makes them; wave_modulus: (N,) of waves at rest [Pa], which a rollout works
-    out for its boundaries (`stepping.bounds.with_wave_modulus`).
+    out for its boundaries (`stepping.bounds.with_wave_modulus`); field: (N,) int32, from 0, which
+    of `Config.fields` each particle moves in, or None where there is one; friction: () Coulomb's
+    coefficient between these, or None for none.
     """
 
     mass: Array
@@ -179,6 +196,8 @@ class Model:
     gravity: Array | None
     boundaries: tuple = ()
     wave_modulus: Array | None = None
+    field: Array | None = None
+    friction: Array | None = None
 
 
 class Status(NamedTuple):

@@ -42,7 +42,7 @@ def expected(scene: Scene, built: Built) -> dict[str, int]:
     placement, transfer = config.placement, config.transfer
     row, stencil = 4 * config.columns, transfer.spline.width**3
     chunk = max(into.size for into in cuts(config.runs, placement))
-    window = windowed(config, simulation.state).computed.nodes
+    rows = windowed(config, simulation.state).rows
     arrays = jax.tree.leaves((simulation.state, simulation.model))
     moving = look.gaussians.count
     drawn = moving + sum(one.count for one, _ in look.solids)
@@ -50,7 +50,7 @@ def expected(scene: Scene, built: Built) -> dict[str, int]:
     return {
         "program": PROGRAM,
         "state and parameters": STATES * sum(leaf.nbytes for leaf in arrays),
-        "grid": NODES * row * window * placement.devices,
+        "grid": NODES * row * rows * placement.devices,
         "transfers": stencil * row * placement.devices * chunk,
         "motion": CARRIED * moving * scene.frames,
         "splats": SPLAT * drawn * drawn_at_once(scene.frames),

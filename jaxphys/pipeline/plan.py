@@ -73,6 +73,10 @@ OPTIONAL: Mapping[str, tuple[str, str]] = MappingProxyType(
             "no boundary touches particles",
         ),
         "friction": ("a boundary is rough", "no boundary is rough"),
+        "contact between objects": (
+            "the scene asks for it; each has a velocity field of its own",
+            "objects that meet share one velocity field",
+        ),
         "turned view directions": (
             "harmonics depend on them",
             "colours are the same from everywhere",

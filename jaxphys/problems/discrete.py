@@ -174,6 +174,8 @@ def discretise(
     boundaries: tuple = (),
     contacts: tuple = (),
     parameters: Mapping[str, float] | None = None,
+    objects: np.ndarray | None = None,
+    friction: float = 0.0,
     staggered: bool = True,
     room: Room | None = None,
     transfer: Transfer = DEFAULT,
@@ -189,6 +191,8 @@ def discretise(
         spacing: dx [m]; scale: see `Discretisation`; gravity: [m/s^2].
         boundaries: in units of dx, prepared; contacts: likewise, still to be prepared for the
             particles that they touch.
+        objects: (N,) from 0, which object each point belongs to, where these meet by contact with
+            `friction`; None: all share one velocity field.
         staggered: whether velocities start at -dt/2 rather than at 0.
     """
     count = len(points)
@@ -206,7 +210,15 @@ def discretise(
     affine = jnp.where(real[:, None, None], affine, 0.0)
     full = lambda value: jnp.full((room.particles,), value, dtype)  # noqa: E731
     volume = jnp.asarray(rest_volume, dtype)
-    config = Config(Grid(room.nodes, 1.0), ((law, 0, room.particles),), transfer=transfer)
+    field = None
+    if objects is not None:
+        field = jnp.zeros(room.particles, jnp.int32).at[:count].set(objects.astype(np.int32))
+    config = Config(
+        Grid(room.nodes, 1.0),
+        ((law, 0, room.particles),),
+        transfer=transfer,
+        fields=1 if objects is None else int(np.max(objects)) + 1,
+    )
     if poisson is not None:
         parameters = {"youngs_modulus": truth.youngs, "poisson_ratio": poisson}
     assert parameters is not None  # every law has some
@@ -224,6 +236,8 @@ def discretise(
         },
         gravity=jnp.asarray(gravity, dtype) / spacing,
         boundaries=boundaries,
+        field=field,
+        friction=jnp.asarray(friction, dtype) if friction > 0 else None,
     )
     origin = jnp.asarray(origin, jnp.float64)
     state = initial_state(config, start, v / spacing, F, affine, dtype=dtype, boundaries=boundaries)

@@ -19,6 +19,7 @@ from jaxphys.mpm.boundaries import Rotate as Rotate
 from jaxphys.mpm.boundaries import Steady as Steady
 from jaxphys.mpm.boundaries import Translate as Translate
 from jaxphys.mpm.boundaries import Walls as Walls
+from jaxphys.mpm.meeting import Meeting as Meeting
 
 from .json import scene_from_json as scene_from_json
 from .json import to_json as to_json

@@ -187,6 +187,7 @@ def solver_parts(
         check_step=not scene.unsafe_substep,
         placement=suited(len(arrangement)),
         transfer=scene.transfer,
+        fields=1 if scene.contact is None else len(parts),
     )
 
     def gathered(name: str) -> np.ndarray:
@@ -205,6 +206,8 @@ def solver_parts(
         boundaries=boundaries,
     )
     volume = jnp.asarray(volumes, dtype)
+    object_of = np.repeat(np.arange(len(parts)), [len(part.positions) for part in parts])
+    friction = 0.0 if scene.contact is None else scene.contact.friction
     model = Model(
         mass=density[arrangement] * volume,
         volume=volume,
@@ -212,6 +215,9 @@ def solver_parts(
         # Gravity of zero is left out of the program.
         gravity=jnp.asarray(scene.gravity, dtype) if any(scene.gravity) else None,
         boundaries=boundaries,
+        field=None if scene.contact is None else jnp.asarray(object_of[arrangement], jnp.int32),
+        # Nor has friction of zero any code.
+        friction=jnp.asarray(friction, dtype) if friction > 0 else None,
     )
     return config, model, state
 

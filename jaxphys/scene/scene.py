@@ -21,6 +21,7 @@ from jaxphys.core.fields import (
     vector,
 )
 from jaxphys.mpm.boundaries import AnyBoundary, Vector
+from jaxphys.mpm.meeting import Meeting
 from jaxphys.mpm.stepping import Adaptive, Fixed, Stepping
 from jaxphys.mpm.transfer.schemes import Transfer
 from jaxphys.scene.view import ANGLE, View
@@ -251,6 +252,8 @@ class Scene(Checked):
         boundaries: in the order in which they act.
         domain: the simulated box and its grid.
         transfer: how particles and grid exchange velocities.
+        contact: between the objects, each of which then has a velocity field of its own; null: they
+            share one, and cling where they meet.
         damping: the grid's velocity decays at this rate [1/s].
         frames: pictures of the video, the first one at rest.
         fps: pictures a second of the video.
@@ -280,6 +283,7 @@ class Scene(Checked):
     boundaries: tuple[AnyBoundary, ...] = ()
     domain: Domain = Domain()
     transfer: Transfer = Transfer()
+    contact: Meeting | None = None
     damping: float = field(default=0.0, metadata=between(0, 1e12))
     frames: int = field(default=48, metadata=between(1, 100_000))
     fps: float = field(default=24.0, metadata=between(0.1, 1000.0))
@@ -302,6 +306,10 @@ class Scene(Checked):
         super().__post_init__()
         if not self.objects:
             raise InputError("objects: a scene needs at least one object")
+        if self.contact is not None and len(self.objects) < 2:
+            raise InputError(
+                "contact: is between objects, and there is one; set it to null, or list another"
+            )
         if self.substep is not None and self.stepping not in (None, Fixed()):
             raise InputError(
                 f"substep: {self.substep} is a fixed step, but stepping is not; leave out one of "

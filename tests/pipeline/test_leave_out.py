@@ -36,7 +36,16 @@ COUNT = 24
 PLACE = 0.3 + 0.3 * np.random.default_rng(0).random((COUNT, 3))
 
 
-def scene(law=NEO_HOOKEAN, *, bounds=(), gravity=False, dtype=jnp.float64, laws=None, **options):
+def scene(
+    law=NEO_HOOKEAN,
+    *,
+    bounds=(),
+    gravity=False,
+    dtype=jnp.float64,
+    laws=None,
+    field=None,
+    **options,
+):
     """(config, model, state): the smallest scene, with what is asked for."""
     grid = Grid((10, 10, 10), 0.1)
     config = Config(grid, laws or ((law, 0, COUNT),), check_step=False, **options)
@@ -49,6 +58,7 @@ def scene(law=NEO_HOOKEAN, *, bounds=(), gravity=False, dtype=jnp.float64, laws=
         parameters={name: jnp.full(COUNT, 0.3, dtype) for name in names},
         gravity=jnp.array([0, 0, -9.8], dtype) if gravity else None,
         boundaries=made,
+        field=field,
     )
     return config, model, initial_state(config, PLACE, dtype=dtype, boundaries=made)
 
@@ -81,6 +91,7 @@ MARKED = {
     "gravity": scene(gravity=True),
     "compensated sums": scene(dtype=jnp.float32),
     "velocity of its own": scene(transfer=Transfer(FLIP(0.9))),
+    "contact between objects": scene(fields=2, field=jnp.arange(COUNT, dtype=jnp.int32) % 2),
     "contact": scene(bounds=(listed.Plane((0, 0, 0.2), (0, 0, 1.0), friction=0.0),)),
     "friction": scene(bounds=(listed.Plane((0, 0, 0.2), (0, 0, 1.0), friction=0.4),)),
 }

@@ -18,8 +18,9 @@ CELLS = [problem for problem in PROBLEMS.values() if problem.norm is displacemen
 def test_names_and_what_a_problem_says_of_itself():
     assert set(PROBLEMS) == {
         "free-bar", "held-bar", "sudden-column", "particle", "rotation", "vortex", "cube",
-        "ringing-cube", "cantilever", "colliding-bars", "spinning-disc", "sliding-block",
-        "sticking-block", "hertz", "taylor-bar", "poiseuille", "bingham", "taylor-green",
+        "ringing-cube", "cantilever", "colliding-bars", "parting-bars", "colliding-discs",
+        "spinning-disc", "sliding-block", "sticking-block", "sliding-on-slab",
+        "sticking-on-slab", "hertz", "taylor-bar", "poiseuille", "bingham", "taylor-green",
         "dam-break", "grains-1", "grains-2",
     }  # fmt: skip
     for name, problem in PROBLEMS.items():

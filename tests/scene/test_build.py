@@ -12,11 +12,11 @@ from jaxphys.gaussians.gaussians import covariances, from_points
 from jaxphys.mpm.boundaries import Plane, Translate
 from jaxphys.mpm.loop.frames import advance_frame, rollout_frames
 from jaxphys.mpm.loop.rollout import step
-from jaxphys.mpm.stepping import Adaptive, Fixed
+from jaxphys.mpm.stepping import Adaptive, Fixed, Implicit
 from jaxphys.mpm.transfer import AFLIP, APIC, FLIP, Transfer
 from jaxphys.pipeline.draw import draw
 from jaxphys.render.camera import orbit
-from jaxphys.scene import Domain, Object, Region, Rotation, Scene
+from jaxphys.scene import Domain, Meeting, Object, Region, Rotation, Scene
 from jaxphys.scene.build import build
 from jaxphys.scene.json import scene_from_json, to_json
 
@@ -254,3 +254,42 @@ def test_gradient_of_a_pixel_loss_is_the_central_difference():
         nudge = jnp.zeros(3).at[axis].set(1e-5)
         difference = (loss(young, velocity + nudge) - loss(young, velocity - nudge)) / 2e-5
         assert float(by_velocity[axis]) == pytest.approx(float(difference), rel=2e-3, abs=1e-9)
+
+
+def meeting(contact, **changes):
+    """Two objects side by side, the one that comes first in the domain listed last."""
+    right, left = (Object(**(THING | {"centre": (x, 0.5, 0.5), "size": 0.25})) for x in (0.7, 0.3))
+    return replace(scene(), objects=(right, left), contact=contact, **changes)
+
+
+def test_objects_that_meet_have_a_velocity_field_each():
+    built = build(meeting(Meeting(friction=0.4)), GAUSSIANS, GAUSSIANS, dtype="float32")
+    config, model, state = built.simulation.config, built.simulation.model, built.simulation.state
+    assert config.fields == 2 and model.friction.dtype == jnp.float32
+    assert np.array_equal(model.field == 0, state.position[0] > 0.5)
+    found = parts(partial(step, config), model, state, 1e-4)
+    assert found["contact between objects"] > 0
+    rougher = built.simulation.with_(friction=0.7)
+    assert float(rougher.model.friction) == pytest.approx(0.7)
+    for friction, message in ((-0.1, "at least 0"), ((0.1, 0.2), "give one number")):
+        with pytest.raises(InputError, match=f"with_: friction.*{message}"):
+            built.simulation.with_(friction=friction)
+
+
+def test_objects_that_do_not_meet_by_contact_have_none_of_it():
+    shared, smooth = (
+        build(meeting(contact), GAUSSIANS, GAUSSIANS).simulation for contact in (None, Meeting())
+    )
+    assert shared.config.fields == 1 and shared.model.field is None is shared.model.friction
+    assert smooth.config.fields == 2 and smooth.model.friction is None
+    with pytest.raises(InputError, match="no boundary here has friction, nor has contact"):
+        smooth.with_(friction=0.3)
+
+
+def test_contact_between_objects_is_refused_where_it_cannot_be():
+    with pytest.raises(InputError, match=r"contact: is between objects, and there is one"):
+        replace(scene(), contact=Meeting())
+    with pytest.raises(InputError, match=r"scene\.contact\.friction: .* at least 0"):
+        scene_from_json(to_json(meeting(Meeting())) | {"contact": {"friction": -1}})
+    with pytest.raises(InputError, match="Implicit: contact between objects needs explicit steps"):
+        build(meeting(Meeting(), stepping=Implicit()), GAUSSIANS, GAUSSIANS)

@@ -157,5 +157,5 @@ def sent_planes(config: Config) -> float:
 
 def sent_bytes(config: Config) -> int:
     """Bytes that a device sends to others in a step in float32, at most."""
-    plane = config.nodes[1] * config.nodes[2] * config.columns * NUMBER
+    plane = config.fields * config.nodes[1] * config.nodes[2] * config.columns * NUMBER
     return round(sent_planes(config) * plane)

@@ -20,6 +20,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.flatten_util import ravel_pytree
 
+from jaxphys.core.program import part
 from jaxphys.mpm.boundaries import stages
 from jaxphys.mpm.loop import halo
 from jaxphys.mpm.loop.particle_step import (
@@ -36,6 +37,7 @@ from jaxphys.mpm.loop.placement import AXIS, EVERYWHERE, spread
 from jaxphys.mpm.loop.rates import slowest
 from jaxphys.mpm.loop.status import NO_FAILURE, failure, first_failure
 from jaxphys.mpm.loop.window import extent
+from jaxphys.mpm.meeting import meet
 from jaxphys.mpm.state import Config, Residual
 from jaxphys.mpm.transfer import (
     gather,
@@ -126,16 +128,28 @@ def at_nodes(config: Config, shared: Shared, rows: Array, fixed: Fixed) -> Array
     def updated(common, own):
         shared, lightest = common
         rows, origin = own
-        rows = update_grid(shared, lightest, rows)
-        return None, stages.on_grid(
-            shared.boundaries,
-            config.grid,
-            config.nodes,
-            origin.reshape(3),
-            rows,
-            shared.time,
-            shared.dt,
-        )
+        given, rows = rows, update_grid(shared, lightest, rows)
+
+        def held(rows):
+            return stages.on_grid(
+                shared.boundaries,
+                config.grid,
+                config.nodes,
+                origin.reshape(3),
+                rows,
+                shared.time,
+                shared.dt,
+            )
+
+        if config.fields == 1:
+            return None, held(rows)
+        apart = config.fields, *config.nodes
+        with part("contact between objects"):
+            velocity = rows.T[:3].reshape(3, *apart)
+            velocity = meet(given[:, 3].reshape(apart), velocity, lightest, shared.friction)
+            rows = jnp.concatenate([velocity.reshape(3, -1), rows.T[3:]]).T
+        each = rows.reshape(config.fields, -1, config.columns)
+        return None, jax.lax.map(held, each).reshape(rows.shape)
 
     if config.slabs is not None:
         updated = spread(config.placement, updated, lambda nothing: nothing)
@@ -192,8 +206,8 @@ def _forward_chunks(config: Config, last: bool, common, own):
     wrench = None if last else stages.no_wrench(shared.boundaries, nodes.dtype)
     seen, results = nothing_seen(config), []
 
-    def taken(particles):
-        at = stencil(window, origin, particles.position)
+    def taken(particles, field):
+        at = stencil(window, origin, particles.position, field)
         return Flow.of(config, *gather(window, at, nodes))
 
     def moved(law, matter, numbers, particles, residual, flow):
@@ -219,7 +233,7 @@ def _forward_chunks(config: Config, last: bool, common, own):
 
     def of_last(law, seen, chunk):
         matter, flags, numbers, particles, residual = chunk
-        flow = taken(particles)
+        flow = taken(particles, flags.field)
         *results, seen_too = moved(law, whole(matter, flags), numbers, particles, residual, flow)
         return seen.also(seen_too), (*results, flow)
 
@@ -236,12 +250,12 @@ def _forward_chunks(config: Config, last: bool, common, own):
 
         def went_on():
             particles, residual = jax.tree.map(lambda x: x[k], state)
-            return particles, residual, taken(particles)
+            return particles, residual, taken(particles, matter.field)
 
         particles, residual, flow = jax.lax.cond(first, started, went_on)
         particles, residual, used, seen_too = moved(law, matter, numbers, particles, residual, flow)
         particles, momentum, affine, own = give(config, law, shared, matter, particles, used)
-        at = stencil(window, target, particles.position)
+        at = stencil(window, target, particles.position, matter.field)
         rows = scatter(window, at, rows, matter.mass, momentum, affine)
         state = jax.tree.map(
             lambda whole, x: jax.lax.dynamic_update_index_in_dim(whole, x, k, 0),

@@ -24,7 +24,8 @@ class Shared(NamedTuple):
 
     gravity: (3,) [m/s^2] or None; boundaries: without what they hold of every particle; dt: [s], of
     the step that moves; ahead: [s], of the next one, for which a pass gives; time: [s], at the
-    start of the step that moves; later: at its end, where the next one starts.
+    start of the step that moves; later: at its end, where the next one starts; friction: between
+    objects that have a velocity field each, or None.
     """
 
     gravity: Array | None
@@ -33,17 +34,20 @@ class Shared(NamedTuple):
     ahead: Array
     time: Array
     later: Array
+    friction: Array | None = None
 
 
 class Matter(NamedTuple):
     """What no step changes, of some particles: mass (N,) [kg], volume (N,) [m^3], parameters of
-    their law, and the loads of every boundary.
+    their law, the loads of every boundary, and in which velocity field they move, (N,) int32 or
+    None where there is one.
     """
 
     mass: Array
     volume: Array
     parameters: dict[str, Array]
     loads: tuple[dict[str, Array], ...]
+    field: Array | None = None
 
 
 class Particles(NamedTuple):

@@ -202,7 +202,7 @@ def _tangent_chunks(config: Config, last: bool, common, own):
 
     def of_chunk(law, sums, chunk):
         matter, flags, particles, gathered, of_matter, of_start, of_particles = chunk
-        at = stencil(window, origin, particles.position)
+        at = stencil(window, origin, particles.position, flags.field)
         moved = of_particles.position
         flow = Flow.of(config, *gather_tangent(window, at, nodes, moved, of_nodes))
         if not last:
@@ -216,7 +216,7 @@ def _tangent_chunks(config: Config, last: bool, common, own):
             return sums, (*rates, flow)
         (after, *given, _), (of_after, *of_given, of_wrench) = results, rates
         rows, wrench = sums
-        at = stencil(window, target, after.position)
+        at = stencil(window, target, after.position, flags.field)
         rows = scatter_tangent(
             window, at, rows, (matter.mass, *given), of_after.position, (of_matter.mass, *of_given)
         )
@@ -249,7 +249,7 @@ def _cotangent_chunks(config: Config, last: bool, common, own):
             own_shared, to_matter, to_before, to_gathered = transpose((to_particles, to_flow))
         else:
             after, momentum, affine, _ = results
-            at = stencil(window, target, after.position)
+            at = stencil(window, target, after.position, flags.field)
             to_position, to_mass, to_momentum, to_affine = scatter_transpose(
                 window, at, rows, matter.mass, momentum, affine
             )
@@ -264,7 +264,7 @@ def _cotangent_chunks(config: Config, last: bool, common, own):
         if not last:
             to_start = jax.tree.map(lambda x: jnp.where(first, x, 0), to_gathered)
             to_gathered = jax.tree.map(lambda x: jnp.where(first, 0, x), to_gathered)
-        at = stencil(window, origin, particles.position)
+        at = stencil(window, origin, particles.position, flags.field)
         slopes = gather_slopes(window, at, nodes, gathered.vectors[0], *to_gathered.vectors)
         to_nodes = scatter(window, at, to_nodes, None, *to_gathered.vectors)
         to_before = to_before._replace(position=to_before.position + slopes)

@@ -159,7 +159,8 @@ class Passes(NamedTuple):
         if obstacle is not None and chunks.rigid is not None:
             body = rigid_body.moved(obstacle, chunks.rigid, moves)
             boundaries = rigid_body.placed(boundaries, obstacle, body)
-        shared = Shared(self.model.gravity, boundaries, dt, ahead, chunks.time, later)
+        friction = self.model.friction
+        shared = Shared(self.model.gravity, boundaries, dt, ahead, chunks.time, later, friction)
         target = followed(self.config, chunks.below, chunks.origin)
         start = None if last else self.flows
         (particles, rows, wrench), (residuals, seen) = one_pass(
@@ -244,6 +245,11 @@ def check_fit(config: Config, model: Model, state: State) -> None:
             "State.rigid does not fit the boundaries, of which one is free, or none; give "
             "initial_state(..., boundaries=model.boundaries)."
         )
+    if (model.field is None) == (config.fields > 1):
+        raise InputError(
+            f"Model.field does not fit Config.fields, {config.fields}: give the field of every "
+            "particle where there are several, and none where there is one."
+        )
     if config.particles > MOST_PARTICLES:
         raise InputError(
             f"Config.segments: {config.particles} particles; at most {MOST_PARTICLES} can be told "
@@ -258,7 +264,9 @@ def matter_of(config, model, segments, order) -> tuple[Matter, ...]:
     for (law, _, _), into in zip(config.runs, segments, strict=True):
         mass, volume, load = cut((model.mass, model.volume, loads), into, order, empty=True)
         parameters = law.prepare({name: model.parameters[name] for name in law.parameters})
-        found.append(Matter(mass, volume, cut(parameters, into, order), load))
+        # What is left over moves with the particle that it repeats, lest it stray from the window.
+        parameters, field = cut((parameters, model.field), into, order)
+        found.append(Matter(mass, volume, parameters, load, field))
     return tuple(found)
 
 
@@ -294,7 +302,7 @@ def cut_state(config: Config, state: State, segments, order) -> Chunks:
     return Chunks(
         tuple(particles),
         tuple(residuals),
-        jnp.zeros((config.parts * config.computed.nodes, config.columns), state.position.dtype),
+        jnp.zeros((config.parts * config.rows, config.columns), state.position.dtype),
         jnp.zeros(3 if config.slabs is None else (config.parts, 3), jnp.int32),
         below,
         slowest(config, *jax.lax.stop_gradient((state.velocity, state.affine))),

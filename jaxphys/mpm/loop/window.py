@@ -90,7 +90,8 @@ def windowed(config: Config, state: State, *, slabs: bool | None = None) -> Conf
     none where that would be no gain; and with slabs of it, where devices send less to each other
     with them. What it is depends on the state alone. Runs on the host.
 
-    slabs: whether there may be any; None: where sending less also takes less time.
+    slabs: whether there may be any; None: where sending less also takes less time. There are none
+        where objects have a velocity field each.
     """
     config = replace(config, window=None, slabs=None)
     config = replace(config, window=_window(config, state))
@@ -98,17 +99,18 @@ def windowed(config: Config, state: State, *, slabs: bool | None = None) -> Conf
         # Two that share a memory add windows up faster than they exchange bands.
         shared = jax.default_backend() == "cpu" and jax.process_count() == 1
         slabs = not shared or config.placement.devices >= FEWEST_OF_ONE_MEMORY
+    slabs = slabs and config.fields == 1
     return replace(config, slabs=_slabs(config, state) if slabs else None)
 
 
 def _window(config: Config, state: State) -> tuple[int, int, int] | None:
-    nodes = math.prod(config.grid.shape)
+    nodes = config.fields * math.prod(config.grid.shape)
     worth = WORTH * config.particles
     if nodes < worth:
         return None
     wanted = _with_room(config, _span(config, state.position))
     shape = np.minimum([_of_few(int(count)) for count in wanted], config.grid.shape)
-    if nodes - math.prod(shape.tolist()) < max(worth, nodes // 2):
+    if nodes - config.fields * math.prod(shape.tolist()) < max(worth, nodes // 2):
         return None
     x, y, z = shape.tolist()
     return x, y, z

@@ -40,8 +40,12 @@ class Stencil(NamedTuple):
     distance: Array  # x_k - x_p [m]
 
 
-def stencil(window: Window, origin: Array, position: Array) -> Stencil:
-    """The stencils of particles (3, N) [m]; those outside of the window are clamped to it."""
+def stencil(window: Window, origin: Array, position: Array, field: Array | None = None) -> Stencil:
+    """The stencils of particles (3, N) [m]; those outside of the window are clamped to it.
+
+    field: (N,) int32, in which of several fields of the window, one after the other, each
+    particle's rows are; None where there is one.
+    """
     shape, spacing, grid_shape, kernel = window
     base = kernel.base_node(position, spacing, grid_shape)
     # Clamped for the sake of a particle outside the grid: flagged elsewhere, it must not throw its
@@ -54,6 +58,8 @@ def stencil(window: Window, origin: Array, position: Array) -> Stencil:
         last = jnp.array(shape, dtype=jnp.int32)[:, None] - kernel.width
         local = jnp.clip(base - origin[:, None], 0, last)
     row = (local[0] * shape[1] + local[1]) * shape[2] + local[2]
+    if field is not None:
+        row = row + field * window.nodes
     weight, slope, distance = kernel.weights(offset)
     distance = distance * spacing
     return Stencil(row, weight, weight * distance, slope / spacing, distance)

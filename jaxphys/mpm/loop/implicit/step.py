@@ -46,6 +46,11 @@ def check_implicit(config: Config, model: Model) -> None:
             "Implicit: every device has the window as a whole in implicit steps; set Config.slabs "
             "to None"
         )
+    if config.fields > 1:
+        raise InputError(
+            "Implicit: contact between objects needs explicit steps; set contact to null, or take "
+            "adaptive or fixed steps"
+        )
     for law, _, _ in config.runs:
         if law.energy is None or law.viscosity is not None:
             raise InputError(
