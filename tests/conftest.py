@@ -31,6 +31,23 @@ settings.register_profile("suite", deadline=None, max_examples=20, derandomize=T
 settings.load_profile("suite")
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config):
+    """A run that is cut short has named what failed until then."""
+    terminal = config.pluginmanager.get_plugin("terminalreporter")
+    if terminal is not None and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(_NamesFailures(terminal))
+
+
+class _NamesFailures:
+    def __init__(self, terminal):
+        self.terminal = terminal
+
+    def pytest_runtest_logreport(self, report):
+        if report.failed:
+            self.terminal.write_line(f"\nFAILED {report.nodeid}")
+
+
 def _memory_maps() -> int:
     maps = Path("/proc/self/maps")
     return maps.read_bytes().count(b"\n") if maps.exists() else 0

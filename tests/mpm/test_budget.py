@@ -85,19 +85,30 @@ def gradient(loss, adjoint):
     return compiled(1.0), compiled.memory_analysis().temp_size_in_bytes
 
 
-def test_the_measured_peak_fits_and_the_gradient_is_the_same(thrown):
+@pytest.fixture(scope="module")
+def expected(thrown):
+    """The plain gradient and what it keeps."""
+    return gradient(thrown[0], Plain())
+
+
+# Enough for half of the steps; for segments; for segments of segments.
+@pytest.mark.parametrize(
+    "steps",
+    [pytest.param(66, marks=pytest.mark.slow), pytest.param(35, marks=pytest.mark.slow), 28],
+)
+def test_the_measured_peak_fits_and_the_gradient_is_the_same(thrown, expected, steps):
     loss, a_step = thrown
-    expected, everything = gradient(loss, Plain())
-    # Enough for half of the steps; for segments; for segments of segments.
-    for steps in (66, 35, 28):
-        found, peak = gradient(loss, Checkpointed(bytes=steps * a_step))
-        np.testing.assert_allclose(found, expected, rtol=1e-12)
-        assert peak <= steps * a_step < everything
+    plain, everything = expected
+    found, peak = gradient(loss, Checkpointed(bytes=steps * a_step))
+    np.testing.assert_allclose(found, plain, rtol=1e-12)
+    assert peak <= steps * a_step < everything
     with pytest.raises(InputError, match=r"Checkpointed\.bytes .* need at least"):
         gradient(loss, Checkpointed(bytes=20 * a_step))
 
 
-@pytest.mark.parametrize(("frames", "room"), [pytest.param(11, 22, marks=pytest.mark.slow), (41, 38)])
+@pytest.mark.parametrize(
+    ("frames", "room"), [pytest.param(11, 22, marks=pytest.mark.slow), (41, 38)]
+)
 def test_frames_in_a_budget(thrown, frames, room):
     """The starts of all frames, and of groups of frames."""
     config, model, state = block(count=300, shape=(12, 12, 12))

@@ -158,13 +158,13 @@ def gradients(config, model, state):
     ],
 )
 @pytest.mark.parametrize("dtype", DTYPES)
-def test_gradients_of_materials_and_boundaries(dtype, names, boundaries):
+@pytest.mark.parametrize("slabs", [pytest.param(None, marks=pytest.mark.slow), SLABS[2]], ids=str)
+def test_gradients_of_materials_and_boundaries(slabs, dtype, names, boundaries):
     config, model, state = mixed(dtype, boundaries, names, count=70)
     whole = gradients(config, model, state)
     small = 1e-5 if dtype == jnp.float32 else 1e-12
-    for slabs in (None, SLABS[2]):
-        spread = replace(config, placement=Placement(2, 16), slabs=slabs)
-        same(gradients(spread, model, state), whole, small)
+    spread = replace(config, placement=Placement(2, 16), slabs=slabs)
+    same(gradients(spread, model, state), whole, small)
 
 
 SLOW_CUBIC = pytest.param(Transfer(APIC(), "cubic"), marks=pytest.mark.slow)
@@ -180,6 +180,7 @@ def test_transfers_on_slabs(transfer):
     same(gradients(spread, model, state), whole, 1e-12)
 
 
+@pytest.mark.slow
 def test_tangents_on_slabs_are_those_of_the_way_back():
     config, model, state = mixed(jnp.float64, EVERY_BOUNDARY[:1], ("jelly",), count=70)
     config = replace(config, placement=Placement(2, 16), slabs=SLABS[2])

@@ -16,7 +16,6 @@ from jaxphys.mpm.materials.catalogue import MATERIALS
 from jaxphys.pipeline.frames import simulate
 from jaxphys.scene import Domain, Filling, Object, Plane, Rotation, Scene
 from jaxphys.scene.build import build
-from tests.mpm.cases import KINDS
 
 SPACING = 1 / 12
 SIDE = 15 * SPACING

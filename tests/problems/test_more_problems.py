@@ -119,7 +119,7 @@ def test_the_angle_of_grains_is_that_of_plane_strain():
     ("name", "levels", "order", "band"),
     [
         pytest.param("poiseuille", (4, 8, 16), 2.0, 0.35, marks=pytest.mark.slow),
-        ("ringing-cube", (6, 9, 12), 2.0, 0.25),
+        pytest.param("ringing-cube", (6, 9, 12), 2.0, 0.25, marks=pytest.mark.slow),
         ("taylor-green", (4, 8, 16), 2.0, 0.3),
     ],
 )

@@ -155,6 +155,7 @@ def test_muscle_shortens_and_lengthens_again():
     assert long > short + 0.1 * start
 
 
+@pytest.mark.slow
 def test_snow_crumbles_on_a_log_and_is_packed_by_a_floor():
     """What lies loose has grown by half for good: most of it where the scene's log pulls it apart,
     on both sides, and next to nothing without the log. What is packed has lost a tenth.
