@@ -6,6 +6,7 @@ some centimetres, so that these scenes are of a table's size.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -28,10 +29,14 @@ TABLE = (0.55, 0.66, 0.78)  # white matter shows on what is not white
 
 
 class Event(NamedTuple):
-    """A scene and the Gaussians of its objects."""
+    """A scene, and what makes the Gaussians of each of its objects."""
 
     scene: Scene
-    objects: tuple[Gaussians, ...]
+    makers: tuple[Callable[[], Gaussians], ...]
+
+    def objects(self) -> tuple[Gaussians, ...]:
+        """The Gaussians, which take some seconds."""
+        return tuple(make() for make in self.makers)
 
 
 def gaussians(parts: Parts, count: int) -> Gaussians:
@@ -99,7 +104,10 @@ def toothpaste(spacing: float = 0.0125) -> Event:
     )
     return Event(
         scene,
-        (gaussians({"white": colours}, 4000), gaussians({"white": tufts, "blue": handle}, 6000)),
+        (
+            partial(gaussians, {"white": colours}, 4000),
+            partial(gaussians, {"white": tufts, "blue": handle}, 6000),
+        ),
     )
 
 
@@ -115,9 +123,6 @@ def cream(spacing: float = 0.018) -> Event:
     path = np.stack([out * np.cos(angle), out * np.sin(angle), 0.1 + 0.5 * t], -1)
     swirl = tube(path, 0.13 - 0.1 * t**2, sharp=True, sides=10, winds=True)
     core = lathe([(0, 0.02), (0.33, 0.02), (0.3, 0.12), (0, 0.55)])
-    dollop = gaussians({"white": [swirl, core]}, 8000)
-    pancakes = gaussians({"golden": stack}, 6000)
-    berry, _ = library_object("strawberry", 0, 2000)
     return Event(
         Scene(
             objects=(
@@ -155,7 +160,11 @@ def cream(spacing: float = 0.018) -> Event:
             background=TABLE,
             ground=Ground(floor, colour=TABLE),
         ),
-        (dollop, pancakes, berry),
+        (
+            partial(gaussians, {"white": [swirl, core]}, 8000),
+            partial(gaussians, {"golden": stack}, 6000),
+            lambda: library_object("strawberry", 0, 2000)[0],
+        ),
     )
 
 
@@ -211,7 +220,7 @@ def muscle(spacing: float = 0.05) -> Event:
             ground=Ground(floor),
             obstacle_colour=(0.9, 0.86, 0.76),
         ),
-        (gaussians({"cream": belly}, 5000), gaussians(iron, 2500)),
+        (partial(gaussians, {"cream": belly}, 5000), partial(gaussians, iron, 2500)),
     )
 
 

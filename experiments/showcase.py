@@ -79,7 +79,8 @@ def main() -> None:
     for material in OBJECTS if options.material == "all" else (options.material,):
         spacing = {} if options.spacing is None else {"spacing": options.spacing}
         if material in EVENTS:
-            scene, objects = EVENTS[material](**spacing)
+            event = EVENTS[material](**spacing)
+            scene, objects = event.scene, event.objects()
         else:
             scene = default_scene(material, **spacing)
             kind, seed = OBJECTS[material]
