@@ -1,4 +1,5 @@
-"""The materials, each on an object it suits, without any trained prior.
+"""The materials, each on an object it suits, without any trained prior: in its default scene, or
+in an event of its own (`experiments.events`) where that tells more.
 
     python -m experiments.showcase jelly --out outputs/showcase
     python -m experiments.showcase all --sheets docs/figures
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from experiments.events import EVENTS
 from jaxphys import animate, default_scene
 from jaxphys.gaussians import Gaussians, gaussians_from_mesh
 from jaxphys.gaussians.mesh import Mesh
@@ -76,7 +78,14 @@ def main() -> None:
     options = parser.parse_args()
     for material in OBJECTS if options.material == "all" else (options.material,):
         spacing = {} if options.spacing is None else {"spacing": options.spacing}
-        scene = default_scene(material, **spacing)
+        if material in EVENTS:
+            event = EVENTS[material](**spacing)
+            scene, objects = event.scene, event.objects()
+        else:
+            scene = default_scene(material, **spacing)
+            kind, seed = OBJECTS[material]
+            seed = seed if options.seed is None else options.seed
+            objects = (model_gaussians(kind, options.splats, seed),)
         frames = options.frames or scene.frames
         scene = dataclasses.replace(
             scene,
@@ -85,12 +94,7 @@ def main() -> None:
             width=options.width,
             height=options.height,
         )
-        kind, seed = OBJECTS[material]
-        seed = seed if options.seed is None else options.seed
-        thing = model_gaussians(kind, options.splats, seed)
-        out = animate(
-            scene, options.out / material, objects=(thing,), overwrite=True, progress=True
-        )
+        out = animate(scene, options.out / material, objects=objects, overwrite=True, progress=True)
         if options.sheets:
             small_sheet(out, options.sheets / f"{material}.jpg")
 

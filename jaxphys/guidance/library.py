@@ -1,6 +1,6 @@
 """An object straight from the parametric model that the words mean: no prior is asked."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,6 +9,9 @@ from jaxphys.gaussians.gaussians import Gaussians
 from jaxphys.gaussians.surface import even_samples, gaussians_from_samples
 from jaxphys.guidance import views
 from jaxphys.guidance.guides import object_of, phrases_of
+
+if TYPE_CHECKING:  # the library is large, and loaded where it is asked for
+    from jaxphys.library.model import Model
 
 COUNT = 30_000
 OVERSAMPLING = 3  # as for meshes: what is crowded is thinned out
@@ -72,7 +75,13 @@ def library_object(
     for name, words in wanted.given.items():
         given[name] = (*given.get(name, ()), *words)
     built = usual(wanted.kind, seed, given)
-    surface = built.model.sample(OVERSAMPLING * count, np.random.default_rng(seed))
+    return gaussians_of(built.model, count, seed), built.attributes
+
+
+def gaussians_of(model: "Model", count: int, seed: int = 0) -> Gaussians:
+    """`count` flat Gaussians, evenly over what is seen of a parametric model; lit from above, as
+    the priors' objects are.
+    """
+    surface = model.sample(OVERSAMPLING * count, np.random.default_rng(seed))
     colours = views.lit(surface.colours, surface.normals)
-    samples = even_samples(surface.points, surface.normals, colours, count)
-    return gaussians_from_samples(samples), built.attributes
+    return gaussians_from_samples(even_samples(surface.points, surface.normals, colours, count))
