@@ -337,7 +337,7 @@ def _steps(simulation: Simulation) -> tuple[str, float, int]:
     try:
         check_implicit(replace(config, slabs=None), model)
     except InputError as error:
-        return f"explicit alone is possible ({error})", simulation.dt, steps
+        return f"only explicit steps will do ({error})", simulation.dt, steps
     choice = which_stepping(config, model, state, simulation.frame_time)
     if not isinstance(simulation.stepping, Implicit):
         return choice.reason, simulation.dt, steps
