@@ -150,6 +150,7 @@ def _along(loss, x, d):
     return jax.jvp(loss, (x,), (d,))[1]
 
 
+@pytest.mark.slow
 def test_gradients_of_several_scenes_at_once(thrown):
     loss, x = thrown
     scenes = x * jnp.array([[1.0], [1.02], [0.97]])
@@ -159,6 +160,7 @@ def test_gradients_of_several_scenes_at_once(thrown):
         np.testing.assert_allclose(ours, gradient(scene), rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_hessian_in_both_orders(thrown):
     loss, x = thrown
     gradient = jax.jit(jax.grad(loss))

@@ -66,7 +66,7 @@ STRESSES += ("cohesion", "relaxing_modulus", "fibre_stiffness", "consistency")
 UNITS = dict.fromkeys(STRESSES, 1e3) | {"viscosity": 50.0, "plastic_viscosity": 100.0}
 
 
-# Each compiles for half a minute; every law's gradient is in docs/gradients.jsonl too.
+# Each compiles for half a minute to a minute; most laws' gradient is in docs/gradients.jsonl too.
 QUICK = ("snow",)
 
 
