@@ -177,6 +177,7 @@ def test_hessian_in_both_orders(thrown):
 @pytest.mark.parametrize(
     "names", [("metal",), *(pytest.param((n,), marks=pytest.mark.slow) for n in MATERIALS)]
 )
+@pytest.mark.slow
 def test_second_derivatives_of_every_law(names):
     """In both orders, where the principal stretches differ and from rest, where all are one."""
     config, model, state = mixed(jnp.float64, EVERY_BOUNDARY[:1], names, count=60)

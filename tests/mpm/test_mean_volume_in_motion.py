@@ -142,6 +142,7 @@ def test_one_answer_in_chunks_windows_and_slabs(dtype, options):
     same(end(**options), whole, small)
 
 
+@pytest.mark.slow
 def test_derivatives_in_both_directions_are_the_difference():
     """By every number, where some particles share nodes with others that have their own volume."""
     config, model, state = halves()
