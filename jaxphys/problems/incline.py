@@ -95,36 +95,38 @@ def block(truth: Incline, cells: int, dtype=jnp.float64) -> Discretisation:
 
 
 def slid(problem: Discretisation, state: State) -> float:
-    """How far the block's middle has moved along the plane [m]."""
-    start = problem.spacing * (np.asarray(problem.state.position[0]) - problem.origin[0])
-    return float(np.mean(problem.places(state)[0]) - np.mean(start))
+    """How far the block's middle has moved along what it lies on [m]; its particles come first."""
+    block = slice(0, 8 * round(1 / problem.spacing) ** 3)
+    start, end = (problem.places(one)[0, block] for one in (problem.state, state))
+    return float(np.mean(end) - np.mean(start))
 
 
-def _sliding_error(problem: Discretisation, state: State) -> float:
+def sliding_error(problem: Discretisation, state: State) -> float:
+    """How far from Coulomb's distance the block slid, over that distance."""
     return relative_to(problem.truth.distance, slid(problem, state), state)
 
 
-def _sticking_error(problem: Discretisation, state: State) -> float:
+def sticking_error(problem: Discretisation, state: State) -> float:
     """What it moved over what it would have moved without friction."""
     free = 0.5 * problem.truth.pull * problem.truth.duration**2
     return relative_to(free, free + slid(problem, state), state)
 
 
-_SOURCE = "Coulomb's law of a rigid block"
+SOURCE = "Coulomb's law of a rigid block"
 
 SLIDING_BLOCK = Problem(
     name="sliding-block",
-    source=_SOURCE,
+    source=SOURCE,
     build=partial(block, Incline()),
     ladder=(2, 4, 8),
     order=None,
-    norm=_sliding_error,
+    norm=sliding_error,
 )
 STICKING_BLOCK = Problem(
     name="sticking-block",
-    source=_SOURCE,
+    source=SOURCE,
     build=partial(block, Incline(friction=0.8)),
     ladder=(2, 4, 8),
     order=None,
-    norm=_sticking_error,
+    norm=sticking_error,
 )

@@ -13,10 +13,9 @@ import numpy as np
 from jax import Array
 
 from jaxphys.mpm.materials.elasticity import HENCKY
-from jaxphys.mpm.state import State
 from jaxphys.problems.discrete import Discretisation, discretise, node_wall, steps_for
-from jaxphys.problems.incline import Incline
-from jaxphys.problems.problem import Problem, relative_to
+from jaxphys.problems.incline import SOURCE, Incline, sliding_error, sticking_error
+from jaxphys.problems.problem import Problem
 
 FREE, HELD = 2, 1  # cells of the slab's thickness
 BESIDE = 1.0  # of the slab in front of the block [m]
@@ -75,38 +74,19 @@ def _lattice(spacing: float, *cells: tuple[int, int]) -> np.ndarray:
     return np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
-def slid(problem: Discretisation, state: State) -> float:
-    """How far the block's middle has moved along the slab [m]."""
-    block = slice(0, 8 * round(1 / problem.spacing) ** 3)
-    start, end = (problem.places(one)[0, block] for one in (problem.state, state))
-    return float(np.mean(end) - np.mean(start))
-
-
-def _sliding_error(problem: Discretisation, state: State) -> float:
-    return relative_to(problem.truth.distance, slid(problem, state), state)
-
-
-def _sticking_error(problem: Discretisation, state: State) -> float:
-    """What it moved over what it would have moved without friction."""
-    free = 0.5 * problem.truth.pull * problem.truth.duration**2
-    return relative_to(free, free + slid(problem, state), state)
-
-
-_SOURCE = "Coulomb's law of a rigid block"
-
 SLIDING_ON_SLAB = Problem(
     name="sliding-on-slab",
-    source=_SOURCE,
+    source=SOURCE,
     build=partial(stacked, Stack()),
     ladder=(2, 4, 8),
     order=None,
-    norm=_sliding_error,
+    norm=sliding_error,
 )
 STICKING_ON_SLAB = Problem(
     name="sticking-on-slab",
-    source=_SOURCE,
+    source=SOURCE,
     build=partial(stacked, Stack(friction=0.8)),
     ladder=(2, 4, 8),
     order=None,
-    norm=_sticking_error,
+    norm=sticking_error,
 )

@@ -25,38 +25,45 @@ SCENE = Scene(
     height=24,
 )
 LAYOUTS = ("plain", "sharded", "old", "fp16")
-pytestmark = pytest.mark.slow  # minutes: whole runs with small copies of the published networks
 
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
-    """A run with each layout of the same Stable Diffusion."""
+    """A run with a layout of the same Stable Diffusion, made once."""
     folder = tmp_path_factory.mktemp("runs")
-    for layout in LAYOUTS:
-        weights = checkpoints.stable_diffusion(folder / "weights" / layout, layout)
-        options = {"prior": str(weights), "refiner": "rules", "steps": 2, "splats": 40}
-        generate("a strawberry", SCENE, folder / layout, precision="float32", **options)
-    return folder
+
+    def run_of(layout):
+        if not (folder / layout).exists():
+            weights = checkpoints.stable_diffusion(folder / "weights" / layout, layout)
+            options = {"prior": str(weights), "refiner": "rules", "steps": 2, "splats": 40}
+            generate("a strawberry", SCENE, folder / layout, precision="float32", **options)
+        return folder / layout
+
+    return run_of
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize(
+    "layout", ["plain", *(pytest.param(one, marks=pytest.mark.slow) for one in LAYOUTS[1:])]
+)
 def test_every_layout_reaches_a_video(made, layout):
-    out = made / layout
+    out = made(layout)
     assert (out / "motion.mp4").stat().st_size > 0
     known = json.loads((out / "config.json").read_text())["generation"]
     assert known["prior"].endswith(layout) and known["precision"] == "float32"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["sharded", "old"])
 def test_layouts_of_one_checkpoint_make_the_same_object(made, layout):
     name = "gaussians.ply"
-    assert (made / layout / name).read_bytes() == (made / "plain" / name).read_bytes()
+    assert (made(layout) / name).read_bytes() == (made("plain") / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_another_checkpoint_makes_another_object(made):
     """What distillation does depends on the weights: half precision moves the last digits."""
     name = "gaussians.ply"
-    assert (made / "fp16" / name).read_bytes() != (made / "plain" / name).read_bytes()
+    assert (made("fp16") / name).read_bytes() != (made("plain") / name).read_bytes()
 
 
 @pytest.mark.slow

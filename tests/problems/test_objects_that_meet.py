@@ -13,7 +13,8 @@ from jaxphys.problems.catalogue import PROBLEMS
 from jaxphys.problems.colliding import Bars, meeting, parted
 from jaxphys.problems.discrete import solve
 from jaxphys.problems.discs import Discs, colliding, returned
-from jaxphys.problems.stacked import Stack, slid, stacked
+from jaxphys.problems.incline import slid
+from jaxphys.problems.stacked import Stack, stacked
 
 
 def momentum(problem, state):
