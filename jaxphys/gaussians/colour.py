@@ -17,6 +17,7 @@ as they are where no others are, and the rest is brought in.
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -46,6 +47,7 @@ def _directions() -> np.ndarray:
     return np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=-1)
 
 
+@jax.jit
 def colour_range(gaussians: Gaussians) -> ColourRange:
     """The range of max(harmonics + 0.5, 0) over Gaussians, channels and 24 directions.
 
@@ -67,6 +69,7 @@ def colour_range(gaussians: Gaussians) -> ColourRange:
     return ColourRange(jnp.min(jnp.stack(lows)), jnp.max(jnp.stack(highs)))
 
 
+@jax.jit
 def to_unit_interval(colours: ColourRange) -> ColourRange:
     """The range widened to hold [0, 1]: regularising by it leaves valid colours alone."""
     return ColourRange(jnp.minimum(colours.minimum, 0), jnp.maximum(colours.maximum, 1))

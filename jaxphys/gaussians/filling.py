@@ -15,7 +15,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import jax
 import numpy as np
+from jax import Array
 from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
@@ -95,6 +97,12 @@ def _cells(points: np.ndarray, origin: np.ndarray, spacing: float) -> np.ndarray
     return np.floor((points - origin) / spacing).astype(np.int64)
 
 
+@jax.jit
+def _shapes(gaussians: Gaussians) -> tuple[Array, Array, Array]:
+    """Opacities (N,), own axes (N, 3, 3) and standard deviations along them (N, 3)."""
+    return opacities(gaussians), quaternion_to_matrix(gaussians.quaternions), scales(gaussians)
+
+
 def density_field(
     gaussians: Gaussians, origin: np.ndarray, shape: tuple[int, int, int], config: FillingConfig
 ) -> np.ndarray:
@@ -105,9 +113,7 @@ def density_field(
     """
     spacing = config.spacing
     mean = np.asarray(gaussians.means, np.float64)
-    opacity = np.asarray(opacities(gaussians), np.float64)
-    axes = np.asarray(quaternion_to_matrix(gaussians.quaternions), np.float64)
-    deviation = np.asarray(scales(gaussians), np.float64)
+    opacity, axes, deviation = (np.asarray(x, np.float64) for x in _shapes(gaussians))
     radius = np.clip(np.ceil(deviation.max(axis=1) / spacing), 1, config.reach).astype(int)
     deviation = np.maximum(deviation, spacing / 2)
     cell = _cells(mean, origin, spacing)
@@ -260,7 +266,7 @@ def fill(
     within[unsure] = samples[tuple(_cells(places[unsure], corner, fine).T)]
     points = places[within]
     # Half a pitch from the skin, which is nearer than its points where it is sparse.
-    distance, nearest = cKDTree(means).query(points)
+    distance, nearest = cKDTree(means).query(points, workers=-1)
     gap = np.minimum(GAP * surface_spacing(means)[nearest], config.pitch / 2)
     points = points[np.hypot(gap, config.pitch / 2) < distance]
     if config.area is not None:
@@ -270,7 +276,7 @@ def fill(
         raise _too_many(len(points), config)
     if spread is not None and len(points):
         points = spread(points)
-    cut = cKDTree(means).query(middles)[0] < DEEP * config.pitch
+    cut = cKDTree(means).query(middles, workers=-1)[0] < DEEP * config.pitch
     fine_cells = np.stack(np.meshgrid(*[np.arange(SAMPLES)] * 3, indexing="ij"), axis=-1)
     fine_index = (SAMPLES * index[cut][:, None] + fine_cells.reshape(-1, 3)).reshape(-1, 3)
     fine_index = fine_index[samples[tuple(fine_index.T)]]

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -57,6 +58,7 @@ class Gaussians:
         return sh.degree_of(self.harmonics.shape[1])
 
 
+@jax.jit
 def scales(gaussians: Gaussians) -> Array:
     """Standard deviations along the own axes [m], shape (N, 3), kept within [1e-13, 1e13]."""
     limit = LOG_SCALE_LIMIT
@@ -79,6 +81,7 @@ def covariances(gaussians: Gaussians) -> Array:
     return jnp.moveaxis(algebra.matmul_transpose(A, A), -1, 0)
 
 
+@jax.jit
 def opacities(gaussians: Gaussians) -> Array:
     """Opacities in [0, 1], shape (N,)."""
     return jax.nn.sigmoid(gaussians.opacity_logits)
@@ -130,6 +133,7 @@ def to_splats(
     )
 
 
+@jax.jit
 def opacity_to_logit(opacity: Array) -> Array:
     """Logit of opacities in [0, 1], clipped to +-15 so that 0 and 1 stay finite."""
     limit = 1 / (1 + math.exp(LOGIT_LIMIT))
@@ -179,23 +183,49 @@ def from_points(
                 f"{name} of shape {value.shape} for {count} points: give {shape}"
             ) from error
 
+    return _from_points(
+        points,
+        fit("colours", colours, (count, 3)),
+        fit("sizes", sizes, (count, 3)),
+        fit("opacity", opacity, (count,)),
+        fit(
+            "quaternions",
+            np.array([1, 0, 0, 0]) if quaternions is None else quaternions,
+            (count, 4),
+        ),
+        degree,
+    )
+
+
+@partial(jax.jit, static_argnums=5)
+def _from_points(
+    points: Array, colours: Array, sizes: Array, opacity: Array, quaternions: Array, degree: int
+) -> Gaussians:
+    """As `from_points`, of arrays of the right shapes."""
     smallest, largest = math.exp(-LOG_SCALE_LIMIT), math.exp(LOG_SCALE_LIMIT)
-    log_scales = jnp.log(jnp.clip(fit("sizes", sizes, (count, 3)), smallest, largest))
-    if quaternions is None:
-        quaternions = jnp.array([1, 0, 0, 0], dtype)
-    dc = sh.rgb_to_dc(fit("colours", colours, (count, 3)))[:, None]
-    rest = jnp.zeros((count, (degree + 1) ** 2 - 1, 3), dtype)
+    dc = sh.rgb_to_dc(colours)[:, None]
+    rest = jnp.zeros((len(points), (degree + 1) ** 2 - 1, 3), points.dtype)
     return Gaussians(
         points,
-        log_scales,
-        fit("quaternions", quaternions, (count, 4)),
-        opacity_to_logit(fit("opacity", opacity, (count,))),
+        jnp.log(jnp.clip(sizes, smallest, largest)),
+        quaternions,
+        opacity_to_logit(opacity),
         jnp.concatenate([dc, rest], axis=1),
     )
 
 
 def select(gaussians: Gaussians, index: Array | np.ndarray | slice) -> Gaussians:
     """The Gaussians at `index`: integers, a slice, or (outside jit) a mask (N,)."""
+    if isinstance(index, np.ndarray) and index.dtype == bool:
+        index = np.flatnonzero(index)
+    if isinstance(index, slice):
+        return jax.tree.map(lambda leaf: leaf[index], gaussians)
+    return _at(gaussians, index)
+
+
+@jax.jit
+def _at(gaussians: Gaussians, index: Array) -> Gaussians:
+    # One program for all fields: building a scene is mostly compiling.
     return jax.tree.map(lambda leaf: leaf[index], gaussians)
 
 
@@ -219,7 +249,11 @@ def concatenate(parts: Sequence[Gaussians]) -> Gaussians:
     """All Gaussians of `parts` in order, with the highest degree among them."""
     if not parts:
         raise InputError("no Gaussians to concatenate: give at least one set")
-    degree = max(part.degree for part in parts)
+    return _joined(tuple(parts), max(part.degree for part in parts))
+
+
+@partial(jax.jit, static_argnums=1)
+def _joined(parts: tuple[Gaussians, ...], degree: int) -> Gaussians:
     padded = [with_degree(part, degree) for part in parts]
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves), *padded)
 

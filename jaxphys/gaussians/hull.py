@@ -74,12 +74,12 @@ def surface_spacing(skin: np.ndarray) -> np.ndarray:
     the square that each has to itself.
     """
     count = min(5, len(skin))
-    return cKDTree(skin).query(skin, k=[count])[0][:, 0]
+    return cKDTree(skin).query(skin, k=[count], workers=-1)[0][:, 0]
 
 
 def _known(skin: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
     """Those of `points` farther from the skin than its gaps, a quarter of them deep down."""
-    distance = cKDTree(skin).query(points)[0]
+    distance = cKDTree(skin).query(points, workers=-1)[0]
     some = np.arange(len(points)) % 4 == 0
     return points[(distance > reach) & (some | (distance < 3 * reach))]
 

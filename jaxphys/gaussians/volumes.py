@@ -76,11 +76,11 @@ def body_volumes(
     factor of 1.5 of its cube; the rest is the skin's, which shares it evenly over 1.5 pitches, so
     that a share does not depend on which splat happens to lie deepest.
     """
-    near = cKDTree(skin).query(inner)[0] < DEEP * pitch
+    near = cKDTree(skin).query(inner, workers=-1)[0] < DEEP * pitch
     inside = np.where(near, 0, pitch**3)
     first, group = thinned(skin, _MERGED * pitch)
     corners = skin[first]
-    owner = cKDTree(np.concatenate([corners, inner[near]])).query(samples)[1]
+    owner = cKDTree(np.concatenate([corners, inner[near]])).query(samples, workers=-1)[1]
     count = np.bincount(owner, minlength=len(corners) + near.sum()) * (pitch / SAMPLES) ** 3
     inside[near] = np.clip(count[len(corners) :], pitch**3 / _MOST, pitch**3 * _MOST)
     members = np.bincount(group).astype(float)

@@ -272,6 +272,11 @@ class State(NamedTuple):
     rigid: RigidBody | None = None
 
 
+@jax.jit
+def _particles_last(value: Array) -> Array:
+    return jnp.moveaxis(value, 0, -1)
+
+
 def initial_state(
     config: Config,
     position,
@@ -303,23 +308,24 @@ def initial_state(
                 f"{count} particles; give shape {(count, *shape)}."
             )
         # A copy in any case: the caller's array must survive the state's donation.
-        return jnp.array(jnp.moveaxis(value, 0, -1), copy=True)
+        return _particles_last(value)
 
     def zeros(*shape):
-        return jnp.zeros((*shape, count), dtype)
+        # Of numpy: nothing to compile. So are the constants below.
+        return jnp.asarray(np.zeros((*shape, count)), dtype)
 
     if deformation is not None:
         refuse_inverted(deformation, "initial_state")
     else:
-        deformation = jnp.broadcast_to(jnp.eye(3, dtype=dtype), (count, 3, 3))
+        deformation = np.broadcast_to(np.eye(3), (count, 3, 3))
     history = None
     if config.history_rows:
         columns = []
         for law, start, stop in config.segments:
-            initial = jnp.zeros((config.history_rows,), dtype)
-            initial = initial.at[: len(law.history)].set(jnp.array(law.history, dtype))
-            columns.append(jnp.broadcast_to(initial[:, None], (config.history_rows, stop - start)))
-        history = jnp.concatenate(columns, axis=1)
+            initial = np.zeros(config.history_rows)
+            initial[: len(law.history)] = law.history
+            columns.append(np.broadcast_to(initial[:, None], (config.history_rows, stop - start)))
+        history = jnp.asarray(np.concatenate(columns, axis=1), dtype)
 
     total = last("deformation", deformation, (3, 3)) if config.keeps_total else None
     residual = None

@@ -172,7 +172,8 @@ def program_parts(scene: Scene, built: Built) -> dict[str, int]:
         advance = partial(implicit_step, simulation.config, stepping=simulation.stepping)
     found = parts(advance, simulation.model, state, simulation.dt)
     dtype = state.position.dtype
-    camera = orbit((0.0, 0.0, 0.0), 1.0, 0.0, 0.0, width=scene.width, height=scene.height)
+    somewhere = partial(orbit, (0.0, 0.0, 0.0), width=scene.width, height=scene.height)
+    camera = jax.eval_shape(lambda: somewhere(1.0, 0.0, 0.0))
     paint = partial(picture, surroundings=surroundings_of(scene), capacity=1024)
     frame = jax.eval_shape(lambda s: s.frame(s.state, s.carriers), simulation)
     shown = parts(paint, look, frame, camera, jnp.zeros(2, dtype), jnp.ones((), dtype))

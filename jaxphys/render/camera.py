@@ -6,6 +6,7 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from jaxphys.core.errors import InputError
@@ -87,20 +88,27 @@ def look_at(
     dtype = jax.dtypes.canonicalize_dtype(dtype)  # float64 of numpy where JAX has float32 alone
     eye, target, up = (jnp.asarray(v, dtype) for v in (eye, target, up))
 
-    forward = _unit(target - eye, jnp.array([0.0, 1.0, 0.0], dtype))
-    # The world axis least aligned with the view stands in for an `up` that is parallel to it.
-    spare = jnp.eye(3, dtype=dtype)[jnp.argmin(jnp.abs(forward))]
-    right = _unit(jnp.cross(forward, up), _unit(jnp.cross(forward, spare), spare))
-    rotation = jnp.stack([right, jnp.cross(forward, right), forward])
+    rotation, translation = _facing(eye, target, up)
     focal = 0.5 * width / math.tan(0.5 * field_of_view)
     return Camera(
         rotation=rotation,
-        translation=-rotation @ eye,
-        focal=jnp.full((2,), focal, dtype),
+        translation=translation,
+        focal=jnp.asarray(np.full(2, focal), dtype),
         centre=jnp.array([0.5 * width, 0.5 * height], dtype),
         width=width,
         height=height,
     )
+
+
+@jax.jit
+def _facing(eye: Array, target: Array, up: Array) -> tuple[Array, Array]:
+    """Rotation (3, 3) and translation (3,) of a camera at `eye` that looks at `target`."""
+    forward = _unit(target - eye, jnp.array([0.0, 1.0, 0.0], eye.dtype))
+    # The world axis least aligned with the view stands in for an `up` that is parallel to it.
+    spare = jnp.eye(3, dtype=eye.dtype)[jnp.argmin(jnp.abs(forward))]
+    right = _unit(jnp.cross(forward, up), _unit(jnp.cross(forward, spare), spare))
+    rotation = jnp.stack([right, jnp.cross(forward, right), forward])
+    return rotation, -rotation @ eye
 
 
 def _unit(vector: Array, otherwise: Array) -> Array:

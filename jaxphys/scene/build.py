@@ -209,9 +209,11 @@ def solver_parts(
     object_of = np.repeat(np.arange(len(parts)), [len(part.positions) for part in parts])
     friction = 0.0 if scene.contact is None else scene.contact.friction
     model = Model(
-        mass=density[arrangement] * volume,
+        mass=jnp.asarray(np.asarray(density)[arrangement]) * volume,
         volume=volume,
-        parameters={name: value[arrangement] for name, value in parameters.items()},
+        parameters={
+            name: jnp.asarray(np.asarray(value)[arrangement]) for name, value in parameters.items()
+        },
         # Gravity of zero is left out of the program.
         gravity=jnp.asarray(scene.gravity, dtype) if any(scene.gravity) else None,
         boundaries=boundaries,

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from jaxphys.core.errors import InputError
-from jaxphys.core.rotations import axis_angle_to_matrix
 from jaxphys.gaussians.cropping import object_of
 from jaxphys.gaussians.filling import Filled, FillingConfig, fill
 from jaxphys.gaussians.gaussians import (
@@ -73,8 +73,8 @@ def rotation_matrix(thing: Object, where: str) -> np.ndarray:
         axis = np.asarray(turn.axis, np.float64)
         if not np.any(axis):
             raise InputError(f"{where}.rotation[{i}].axis: is zero; name a direction")
-        matrix = axis_angle_to_matrix(jnp.asarray(axis), jnp.asarray(math.radians(turn.degrees)))
-        total = np.asarray(matrix, np.float64) @ total
+        vector = math.radians(turn.degrees) * axis / np.linalg.norm(axis)
+        total = Rotation.from_rotvec(vector).as_matrix() @ total
     return total
 
 
@@ -201,11 +201,11 @@ def _shown(points: np.ndarray, moving: Gaussians, thing: Object, grid: Grid) -> 
     None reaches through the skin, so that the object looks the same until it comes apart.
     """
     skin = np.asarray(moving.means, np.float64)
-    distance, nearest = cKDTree(skin).query(points)
+    distance, nearest = cKDTree(skin).query(points, workers=-1)
     # Between the splats the skin is nearer than they are.
     gap = GAP * surface_spacing(skin)[nearest]
     depth = np.sqrt(np.maximum(distance**2 - gap**2, 0))
-    colours = np.asarray(dc_to_rgb(moving.harmonics[:, 0]))[nearest]
+    colours = dc_to_rgb(np.asarray(moving.harmonics)[:, 0])[nearest]
     usual = SIZE_OVER_SPACING * _config(thing, grid).pitch
     fits = depth / VISIBLE
     sizes = np.clip(fits, SMALLEST * usual, usual)

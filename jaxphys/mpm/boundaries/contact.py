@@ -19,6 +19,7 @@ from abc import abstractmethod
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal, NamedTuple, Self
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -131,8 +132,8 @@ class Contact(Boundary):
 
     def check_start(self, setting: Setting) -> None:
         """Raises InputError where particles start so deep inside that they would be shot out."""
-        for face in self.faces(jnp.asarray(setting.rest.T, setting.dtype), jnp.zeros(())):
-            depth = -np.asarray(face.distance) / setting.grid.spacing
+        for distance in _distances(self, jnp.asarray(setting.rest.T, setting.dtype)):
+            depth = -np.asarray(distance) / setting.grid.spacing
             if depth.max(initial=0) > DEEPEST:
                 raise InputError(
                     f"{self.place}: {(depth > DEEPEST).sum()} particles start inside of it, up to "
@@ -232,3 +233,9 @@ def held(velocity: Array, face: Face) -> Array:
         # Slowed by what friction takes; what is slower than that stops.
         taken = shortened(tangential, face.friction * jnp.abs(removed))
         return tangential - taken + (along - removed) * face.normal
+
+
+@jax.jit
+def _distances(boundary: Contact, points: Array) -> list[Array]:
+    """Of points (3, N) from each face of a boundary as it stands at time 0, (N,) each."""
+    return [face.distance for face in boundary.faces(points, jnp.zeros(()))]

@@ -404,7 +404,15 @@ def step_bounds(config, model, state, safety: float = SAFETY) -> StepBounds:
     return StepBounds(*bounds, dt=safety * jnp.min(jnp.stack(bounds)))
 
 
-_compiled_bounds = jax.jit(step_bounds, static_argnums=(0, 3))
+# Runs once or twice a film: compiled fast, not to be fast.
+_compiled_bounds = jax.jit(
+    step_bounds,
+    static_argnums=(0, 3),
+    compiler_options={
+        "xla_backend_optimization_level": 0,
+        "xla_llvm_disable_expensive_passes": True,
+    },
+)
 
 
 def largest_stable_dt(config, model, state, safety: float = SAFETY) -> StepBounds:
