@@ -25,7 +25,7 @@ from jaxphys.mpm.simulation import Simulation
 from jaxphys.mpm.state import Model, State
 from jaxphys.mpm.stepping import Adaptive
 from jaxphys.pipeline.draw import frame_splats
-from jaxphys.pipeline.film import picture, surroundings_of
+from jaxphys.pipeline.film import picture, settings_for, surroundings_of
 from jaxphys.pipeline.frames import Moment, moment_of, retried
 from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import next_capacity, required_pairs
@@ -166,7 +166,8 @@ class Session:
         look, frame = self._built.look, self.frame
         points = np.asarray(self._start)
         low, high = points.min(axis=0), points.max(axis=0)
-        needed = required_pairs(frame_splats(look, frame, position(camera)), camera)
+        splats = frame_splats(look, frame, position(camera))
+        needed = required_pairs(splats, camera, settings_for(camera))
         pixels, _ = picture(
             look,
             frame,
