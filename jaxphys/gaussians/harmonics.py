@@ -6,6 +6,7 @@ The functions are orthonormal on the unit sphere.
 """
 
 import math
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +15,7 @@ from jax import Array
 
 from jaxphys.core import algebra
 
+Numbers = TypeVar("Numbers", Array, np.ndarray)
 DC = 0.28209479177387814
 _DEGREE_1 = 0.4886025119029199
 _DEGREE_2 = (
@@ -153,6 +155,6 @@ def rgb_to_dc(rgb: Array) -> Array:
     return (rgb - 0.5) / DC
 
 
-def dc_to_rgb(dc: Array) -> Array:
+def dc_to_rgb(dc: Numbers) -> Numbers:
     """The constant colour of a degree 0 coefficient; not clipped to [0, 1]."""
     return dc * DC + 0.5

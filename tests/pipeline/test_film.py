@@ -11,8 +11,8 @@ import pytest
 from jaxphys.core.ensemble import over_devices
 from jaxphys.mpm import Placement
 from jaxphys.mpm.loop.frames import rollout_frames
-from jaxphys.pipeline.draw import draw
-from jaxphys.pipeline.film import Artist, drawn_at_once, picture
+from jaxphys.pipeline.draw import SETTINGS, draw
+from jaxphys.pipeline.film import ROOM, Artist, _room, drawn_at_once, picture, settings_for
 from jaxphys.pipeline.frames import frames
 from jaxphys.pipeline.output import Timing
 from jaxphys.render.camera import orbit
@@ -50,6 +50,19 @@ def test_no_more_at_once_than_there_are():
     assert drawn_at_once(1) == 1
     assert drawn_at_once(3) == min(3, jax.device_count())
     assert drawn_at_once(1000) == min(8, jax.device_count())
+
+
+@pytest.mark.parametrize("needed", [0, 1, 223, 1_000, 948_687, 2_985_313])
+def test_room_is_an_eighth_more_than_asked_for_at_most(needed):
+    assert ROOM * needed - 1 < _room(needed) <= max(256, 1.126 * ROOM * needed)
+
+
+def test_only_tiles_depend_on_the_size_of_a_picture():
+    small, large = (
+        settings_for(orbit((0, 0, 0), 1.0, 0.0, 0.0, width=width, height=height))
+        for width, height in ((320, 180), (1958, 1090))
+    )
+    assert small == SETTINGS and large == replace(SETTINGS, tile_size=16)
 
 
 @pytest.mark.slow
