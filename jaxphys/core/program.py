@@ -4,12 +4,17 @@ What a plan tells of a program is read off the program itself, so that the two c
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import jax
 
 _MARK = "part: "
+# Options of `jax.jit` for what runs a few times only: compiled fast, not to be fast.
+COMPILED_FAST: Mapping[str, Any] = MappingProxyType(
+    {"xla_backend_optimization_level": 0, "xla_llvm_disable_expensive_passes": True}
+)
 
 
 def part(name: str):

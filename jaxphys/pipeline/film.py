@@ -14,7 +14,7 @@ from jax import Array
 from tqdm import tqdm
 
 from jaxphys.core.ensemble import over_devices
-from jaxphys.core.program import part
+from jaxphys.core.program import COMPILED_FAST, part
 from jaxphys.mpm.motion import Frame
 from jaxphys.pipeline.backdrop import backdrop
 from jaxphys.pipeline.draw import SETTINGS, draw, frame_splats
@@ -141,7 +141,7 @@ def pictures(
     return over_devices(one, devices, in_turn=True)(frames, cameras)
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=dict(COMPILED_FAST))
 def _needed(look: Look, frame: Frame, camera: Camera) -> Array:
     """Pairs of tile and splat of one frame."""
     splats = frame_splats(look, frame, position(camera))

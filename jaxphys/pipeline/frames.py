@@ -140,11 +140,7 @@ def frames(
         SimulationError: names frame, particle and remedy; every moment before it was good.
     """
     timing = timing or Timing()
-    if start is None:
-        start = 0, simulation.state
-        check(simulation.state.status, 0)
-        yield moment_of(simulation, simulation.state, 0, particles)
-    number, state = start
+    number, state = (0, simulation.state) if start is None else start
     config, model = simulation.config, simulation.model
     slabs = slabs_for(simulation.stepping)
 
@@ -152,8 +148,11 @@ def frames(
         return config if whole else windowed(config, state, slabs=slabs)
 
     if config.placement.devices > 1:
-        # Where the frames leave it, so that the first one is no program of its own.
+        # Where the frames leave it, so that the first one is no program of its own, nor its look.
         model, state = jax.device_put((model, state), config.placement.everywhere())
+    if start is None:
+        check(state.status, 0)
+        yield moment_of(simulation, state, 0, particles)
 
     with timing.stage("simulate"), timing.compiling("simulate"):
         jax.block_until_ready(next_frame(simulation, cut(config, state), model, state, None))

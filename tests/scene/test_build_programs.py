@@ -8,9 +8,12 @@ import jax, jaxphys
 from jaxphys.pipeline.plan import ball
 
 found = []
-jax.monitoring.register_event_duration_secs_listener(
-    lambda name, _, **more: found.append(name) if name.endswith("backend_compile_duration") else None
-)
+
+def note(name, seconds, **more):
+    if name.endswith("backend_compile_duration"):
+        found.append(name)
+
+jax.monitoring.register_event_duration_secs_listener(note)
 jaxphys.build(jaxphys.default_scene("jelly"), ball(500))
 print(len(found))
 """

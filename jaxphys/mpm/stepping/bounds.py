@@ -11,6 +11,7 @@ from jax import Array
 
 from jaxphys.core import algebra
 from jaxphys.core.errors import InputError
+from jaxphys.core.program import COMPILED_FAST
 from jaxphys.core.spectral import left_strain
 from jaxphys.mpm.materials.law import Law, Parameters
 from jaxphys.mpm.transfer.kernels import KernelName
@@ -404,15 +405,7 @@ def step_bounds(config, model, state, safety: float = SAFETY) -> StepBounds:
     return StepBounds(*bounds, dt=safety * jnp.min(jnp.stack(bounds)))
 
 
-# Runs once or twice a film: compiled fast, not to be fast.
-_compiled_bounds = jax.jit(
-    step_bounds,
-    static_argnums=(0, 3),
-    compiler_options={
-        "xla_backend_optimization_level": 0,
-        "xla_llvm_disable_expensive_passes": True,
-    },
-)
+_compiled_bounds = jax.jit(step_bounds, static_argnums=(0, 3), compiler_options=dict(COMPILED_FAST))
 
 
 def largest_stable_dt(config, model, state, safety: float = SAFETY) -> StepBounds:
