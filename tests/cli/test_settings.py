@@ -1,6 +1,9 @@
 """`--set`, `--json` and `--quiet`: from the command line into the step, and out for programs."""
 
+import functools
 import json
+import re
+import shlex
 from pathlib import Path
 
 import jax.numpy as jnp
@@ -97,6 +100,25 @@ def test_help_has_an_example(command, capsys):
         with pytest.raises(SystemExit):
             run([*words, "--help"])
         assert f"For example: jaxphys {' '.join(words)}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", sorted(set(COMMANDS) - {"study", "weights"}))
+def test_the_example_of_a_help_is_understood(command, capsys, monkeypatch):
+    """As it is printed, word for word; what the command then does is left out."""
+    monkeypatch.setenv("COLUMNS", "200")
+    with pytest.raises(SystemExit):
+        run([command, "--help"])
+    (example,) = re.findall(r"For example: (jaxphys .*?)\s*│?\n", capsys.readouterr().out)
+    called = []
+
+    @functools.wraps(COMMANDS[command])
+    def instead(*arguments, **options):
+        called.append(arguments)
+        return 0
+
+    monkeypatch.setitem(COMMANDS, command, instead)
+    assert run(shlex.split(example)[1:]) == 0
+    assert len(called) == 1
 
 
 def test_shells_can_complete(capsys):
