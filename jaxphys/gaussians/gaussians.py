@@ -216,10 +216,10 @@ def _from_points(
 
 def select(gaussians: Gaussians, index: Array | np.ndarray | slice) -> Gaussians:
     """The Gaussians at `index`: integers, a slice, or (outside jit) a mask (N,)."""
-    if isinstance(index, np.ndarray) and index.dtype == bool:
-        index = np.flatnonzero(index)
     if isinstance(index, slice):
         return jax.tree.map(lambda leaf: leaf[index], gaussians)
+    if index.dtype == bool:
+        index = np.flatnonzero(index)
     return _at(gaussians, index)
 
 

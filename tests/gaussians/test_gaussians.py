@@ -100,6 +100,7 @@ def test_select_and_concatenate():
     np.testing.assert_array_equal(both.harmonics[:4, 4:], 0)
     np.testing.assert_array_equal(select(both, jnp.arange(4, 7)).means, b.means)
     np.testing.assert_array_equal(select(both, np.arange(7) >= 4).means, b.means)
+    np.testing.assert_array_equal(select(both, jnp.arange(7) >= 4).means, b.means)
     with pytest.raises(InputError, match="at least one"):
         concatenate([])
 
