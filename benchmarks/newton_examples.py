@@ -1,14 +1,16 @@
 """Suite 'newton-examples': two examples of Newton's implicit MPM, run here and by Newton.
 
-The scenes are those of `newton_scenes`. Of the beam, `error` is the root mean square distance of
-the particles at the end from explicit float64 steps of half the length, over the beam's length, and
-`error_finer` that from explicit float64 steps on cells of half the size. Grains cannot be matched
-one to one, so of sand both are distances of each coordinate in sorted order, over the block's size.
+The scenes are those of `newton_scenes`; methods are explicit steps, the same on cells of half the
+size, backward Euler, and Newton's own. Of the beam, `error` is the root mean square distance of the
+particles at the end from explicit float64 steps of half the length, over the beam's length, and
+`error_finer` that from explicit float64 steps on the finer cells. Grains cannot be matched one to
+one, so of sand it is that of each coordinate in sorted order, over the block's size.
 
     python -m benchmarks run newton-examples --out FILE.jsonl [--quick]
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from typing import Any
@@ -29,13 +31,12 @@ from jaxphys.mpm.stepping.implicit import Implicit
 
 EXAMPLES = {f.__name__: f for f in (beam, sand)}
 QUICK = {"beam": {"steps": 2, "cell": 0.5}, "sand": {"steps": 2, "cell": 0.4}}
-LONGEST = {"beam": 1 / 60, "sand": 1 / 60}  # implicit steps of ours [s]
 
 
 def explicit(example: Example, share: float = 1.0) -> tuple[State, dict[str, int]]:
     """The end by explicit steps, `share` of those that are taken by default."""
     dt = SAFETY * share * largest_stable_dt(example.config, example.model, example.state).dt
-    steps = int(np.ceil(example.time / dt))
+    steps = max(1, int(np.ceil(example.time / dt)))
     end = advance_frame(example.config, example.model, example.state, example.time / steps, steps)
     check(end.status)
     return end, {"steps": steps}
@@ -44,7 +45,7 @@ def explicit(example: Example, share: float = 1.0) -> tuple[State, dict[str, int
 def implicit(example: Example, longest: float) -> tuple[State, dict[str, int]]:
     """The end by backward Euler in steps of at most `longest` [s]."""
     state, counts = example.state, np.zeros(3, int)
-    frames = int(np.ceil(example.time / longest - 1e-6))
+    frames = max(1, int(np.ceil(example.time / longest - 1e-6)))
     for _ in range(frames):
         state, report = _advance(example.config, example.model, state, example.time / frames)
         counts += np.array([report.steps, report.rejected, report.effort.products])
@@ -65,7 +66,7 @@ def distance(name: str, one: np.ndarray, other: np.ndarray, size: float) -> floa
 
 
 @cache
-def reference(name: str, finer: int, size: tuple[tuple[str, float], ...]) -> np.ndarray:
+def reference(name: str, size: tuple[tuple[str, float], ...], finer: int = 1) -> np.ndarray:
     """Where explicit float64 steps lead: of half the length, or on finer cells."""
     example = EXAMPLES[name]("float64", finer=finer, **dict(size))
     return places(explicit(example, 0.5 if finer == 1 else 1.0)[0])
@@ -76,26 +77,28 @@ def places(state: State) -> np.ndarray:
     return np.asarray(state.position, np.float64).T
 
 
-def measures(name: str, size: dict[str, float], end: np.ndarray) -> dict[str, Any]:
-    """What a line tells of an end, (N, 3) [m], besides its error."""
+def measures(name: str, size: dict[str, float], end: np.ndarray) -> dict[str, float]:
+    """What a line tells of an end, (N, 3) [m], besides its error.
+
+    Of the beam: `error_finer`; by how much its middle has turned [degrees] and sunk [m]. Of sand,
+    places [m] in the example's own axes: first and last percentile of x, last of y and z, mean
+    height, and the share that lies as high as the box's top.
+    """
     example = EXAMPLES[name](**size)
-    start, key = places(example.state), tuple(size.items())
-    found: dict[str, Any] = {
-        "error_finer": distance(name, end, reference(name, 2, key), example.size),
-        "moved": distance("", end, start, example.size),
-        "time": example.time,
-        "particles": len(end),
-    }
+    start = places(example.state)
     if name == "beam":
+        finer = reference(name, tuple(size.items()), finer=2)
         middle = abs(start[:, 0] - np.median(start[:, 0])) < 1e-3
-        found |= {"sunk": float((start - end)[middle, 2].mean())}
-        found |= {"turned": _turned(start[middle, 1:], end[middle, 1:])}
-    else:
-        x, y, z = (end - MIDDLE).T
-        quantiles = {"left": (x, 1), "right": (x, 99), "front": (y, 1), "top": (z, 99)}
-        found |= {key: float(np.percentile(*pair)) for key, pair in quantiles.items()}
-        found |= {"height": float(z.mean()), "on_box": float((z > 1.5).mean())}
-    return found
+        return {
+            "error_finer": distance(name, end, finer, example.size),
+            "moved": distance(name, end, start, example.size),
+            "sunk": float((start - end)[middle, 2].mean()),
+            "turned": _turned(start[middle, 1:], end[middle, 1:]),
+        }
+    x, y, z = (end - MIDDLE).T
+    quantiles = {"left": (x, 1), "right": (x, 99), "front": (y, 99), "top": (z, 99)}
+    found = {key: float(np.percentile(*pair)) for key, pair in quantiles.items()}
+    return found | {"height": float(z.mean()), "on_box": float((z > 1.5).mean())}
 
 
 def _turned(before: np.ndarray, after: np.ndarray) -> float:
@@ -105,46 +108,62 @@ def _turned(before: np.ndarray, after: np.ndarray) -> float:
     return float(np.degrees(np.arctan2(sine, cosine)))
 
 
-def ours(name: str, size: dict[str, float], longest: float | None = None) -> Prepared:
-    """A run by our steps, compiled: explicit ones, or implicit ones of at most `longest` [s]."""
+def prepared(name: str, size: dict[str, float], method: str) -> Prepared:
+    """A method's run, compiled."""
     jax.config.update("jax_enable_x64", True)
-    example = EXAMPLES[name](**size)
-    run = partial(explicit, example) if longest is None else partial(implicit, example, longest)
+    finer = 2 if method == "jaxphys-finer" else 1
+    example = EXAMPLES[name](**size, finer=finer)
     start = time.perf_counter()
-    end, counts = run()
-    first = time.perf_counter() - start
+    run = RUNS[method](example)
+    compiled = time.perf_counter() - start
+    done: list[tuple[np.ndarray, dict[str, Any]]] = []
+
+    def error() -> float:
+        return distance(name, done[0][0], reference(name, tuple(size.items())), example.size)
+
     return Prepared(
-        lambda: jax.block_until_ready(run()[0]),
+        lambda: done.append(run()),
         work=example.time,
-        error=lambda: distance(
-            name, places(end), reference(name, 1, tuple(size.items())), example.size
-        ),
+        compile_seconds=compiled,
+        error=error,
         once=True,
-        extra=counts | {"first_seconds": first},
-        found=lambda: measures(name, size, places(end)),
+        extra={"particles": len(example.model.mass), "time": example.time},
+        found=lambda: done[0][1] | measures(name, size, done[0][0]),
     )
 
 
-def newton(name: str, size: dict[str, float]) -> Prepared:
-    """A run by Newton, once its kernels are compiled."""
-    jax.config.update("jax_enable_x64", True)
-    example, session = EXAMPLES[name](**size), Session(NEWTON, limit=1800.0)
+def ours(method: Callable, example: Example) -> Callable[[], tuple[np.ndarray, dict[str, Any]]]:
+    """A run of ours, compiled by one of no time at all."""
+    method(replace(example, steps=0))
+
+    def run():
+        end, counts = method(example)
+        return places(end), counts
+
+    return run
+
+
+def newton(example: Example) -> Callable[[], tuple[np.ndarray, dict[str, Any]]]:
+    """A run of Newton's, whose kernels two steps have compiled."""
+    session = Session(NEWTON, limit=1800.0)
     session.load(replace(example.matter, steps=2))
     session.run()
     session.load(example.matter)
-    said: dict[str, Any] = {}
 
-    def end() -> np.ndarray:
-        return session.end()["position"]
+    def run():
+        said = session.run()
+        told = {"steps": example.steps, "peak_bytes": said["peak_bytes"]}
+        return session.end()["position"], told | {"peer_versions": session.ready["versions"]}
 
-    return Prepared(
-        lambda: said.update(session.run()),
-        work=example.time,
-        error=lambda: distance(name, end(), reference(name, 1, tuple(size.items())), example.size),
-        once=True,
-        extra={"steps": example.steps, "peer_versions": session.ready["versions"]},
-        found=lambda: measures(name, size, end()) | {"peak_bytes": said["peak_bytes"]},
-    )
+    return run
+
+
+RUNS = {
+    "jaxphys": partial(ours, explicit),
+    "jaxphys-finer": partial(ours, explicit),
+    "jaxphys-implicit": partial(ours, partial(implicit, longest=1 / 60)),
+    "newton": newton,
+}
 
 
 def left_out_lines() -> list[dict]:
@@ -157,14 +176,12 @@ def left_out_lines() -> list[dict]:
 
 def cases(quick: bool) -> list[Case]:
     """Each example by explicit steps, by implicit ones, and by Newton where it can be run."""
-    found = []
-    for name in EXAMPLES:
-        size = QUICK[name] if quick else {}
-        methods = {
-            "jaxphys": partial(ours, name, size),
-            "jaxphys-implicit": partial(ours, name, size, LONGEST[name]),
-        }
-        if not NEWTON.missing:
-            methods["newton"] = partial(newton, name, size)
-        found += [Case(name, method, prepare, rounds=1) for method, prepare in methods.items()]
-    return found
+    left = {("sand", "jaxphys-implicit")}  # two hundred times the work: docs/benchmarks/peers.md
+    if NEWTON.missing:
+        left |= {(name, "newton") for name in EXAMPLES}
+    return [
+        Case(name, method, partial(prepared, name, QUICK[name] if quick else {}, method), rounds=1)
+        for name in EXAMPLES
+        for method in RUNS
+        if (name, method) not in left
+    ]
