@@ -176,12 +176,9 @@ def left_out_lines() -> list[dict]:
 
 def cases(quick: bool) -> list[Case]:
     """Each example by explicit steps, by implicit ones, and by Newton where it can be run."""
-    left = {("sand", "jaxphys-implicit")}  # two hundred times the work: docs/benchmarks/peers.md
-    if NEWTON.missing:
-        left |= {(name, "newton") for name in EXAMPLES}
+    methods = [method for method in RUNS if method != "newton" or not NEWTON.missing]
     return [
         Case(name, method, partial(prepared, name, QUICK[name] if quick else {}, method), rounds=1)
         for name in EXAMPLES
-        for method in RUNS
-        if (name, method) not in left
+        for method in methods
     ]
