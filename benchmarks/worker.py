@@ -12,7 +12,7 @@ from importlib import metadata
 
 SUITES = (
     *("mpm", "mpm-grad", "scaling", "render", "drawing", "headline", "order", "implicit"),
-    *("extreme", "extreme-peers", "leave-out", "work-precision"),
+    *("extreme", "extreme-peers", "leave-out", "work-precision", "newton-examples"),
 )
 MINIMUM_CALLS = 3
 

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 ENDS = ("position", "velocity", "affine", "deformation")
+TEXTS = ("options", "material", "boundaries")  # fields that go over as JSON
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,9 @@ class Matter:
         law: "neo-Hookean", "fixed corotated" or "Hencky": what a peer that has another must tell.
         gravity: (3,) [m/s^2].
         options: settings of the peer's own, by name.
+        material: numbers of the peer's own law, by name, the same for all particles.
+        boundaries: each a dict: `floor` (height, friction), `box` (centre, half_size, friction) or
+            `driven`: particles, by index, that turn about centre with a spin (3,) [rad/s].
     """
 
     position: np.ndarray
@@ -52,11 +56,14 @@ class Matter:
     law: str = "neo-Hookean"
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
     options: dict[str, Any] = field(default_factory=dict)
+    material: dict[str, float] = field(default_factory=dict)
+    boundaries: list[dict[str, Any]] = field(default_factory=list)
 
     def save(self, path: Path) -> None:
         """Writes the problem as .npz."""
         values = {one.name: getattr(self, one.name) for one in fields(self)}
-        np.savez(path, **(values | {"options": json.dumps(self.options)}))
+        texts = {name: json.dumps(values[name]) for name in TEXTS}
+        np.savez(path, **(values | texts))
 
     @classmethod
     def load(cls, path: Path) -> "Matter":
@@ -70,9 +77,25 @@ class Matter:
             "steps": int(values["steps"]),
             "law": str(values["law"]),
             "gravity": tuple(float(g) for g in values["gravity"]),
-            "options": json.loads(str(values["options"])),
         }
-        return cls(**(values | plain))
+        return cls(**(values | plain | {name: json.loads(str(values[name])) for name in TEXTS}))
+
+
+def turning(
+    told: dict[str, Any], start: np.ndarray, time: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Driven particles at a time [s]: places [m] and velocities [m/s], (N, 3), and the gradient of
+    velocity [1/s], (3, 3). start: (N, 3) [m]; told: as `Matter.boundaries` has it.
+    """
+    centre, spin = np.asarray(told["centre"]), np.asarray(told["spin"])
+    across = np.cross(spin, np.eye(3)).T  # times an arm: spin x arm
+    speed = np.linalg.norm(spin)
+    turn = np.eye(3)
+    if speed:  # Rodrigues' formula
+        axis, angle = across / speed, speed * time
+        turn = turn + np.sin(angle) * axis + (1 - np.cos(angle)) * axis @ axis
+    arm = (start - centre) @ turn.T
+    return centre + arm, arm @ across.T, across
 
 
 @dataclass(frozen=True)
