@@ -25,6 +25,7 @@ from jaxphys.mpm.stepping.implicit import crossing_time
 PRODUCTS = 5.0  # of a step, times the root of its length in explicit steps
 ENOUGH = 50.0  # explicit steps, times the square of cells, from which on there are no more
 OTHERS = 12  # passes of a step besides: evaluations, second derivatives, start and end
+LAG = "but yield lags a step behind, so what flows, as sand does, wants explicit ones"
 MARGIN = 1.5  # by which implicit steps must be cheaper to be advised: they are less accurate
 
 
@@ -91,4 +92,7 @@ def which_stepping(config: Config, model: Model, state: State, time: float) -> C
     bounds = largest_stable_dt(config, model, state)
     longest, span = (float(x) for x in _length_and_span(config, model, state))
     cells = max(span / config.grid.spacing, 1.0)
-    return advised(SAFETY * float(bounds.dt), longest, cells, time)
+    choice = advised(SAFETY * float(bounds.dt), longest, cells, time)
+    if choice.stepping == "implicit" and any(law.plastic for law, _, _ in config.segments):
+        choice = choice._replace(reason=f"{choice.reason}; {LAG}")
+    return choice

@@ -7,7 +7,8 @@ from pathlib import Path
 import jax.numpy as jnp
 import pytest
 
-from jaxphys.mpm.stepping.choice import advised, which_stepping
+from jaxphys.mpm.materials.plasticity import PERFECT_VON_MISES
+from jaxphys.mpm.stepping.choice import LAG, advised, which_stepping
 from tests.mpm.cases import block
 
 COUNTED = Path(__file__).parents[3] / "benchmarks/lines/implicit.jsonl"
@@ -88,3 +89,11 @@ def test_stiffness_and_rest_decide():
     still = state._replace(velocity=0 * state.velocity, affine=0 * state.affine)
     choice = which_stepping(config, stiff, still, 1 / 24)
     assert choice.stepping == "implicit" and choice.reason.startswith("implicit pays")
+    assert LAG not in choice.reason
+    # The same numbers as matter that yields: the advice comes with what it costs.
+    yields = replace(
+        config, segments=tuple((PERFECT_VON_MISES, *cut) for _, *cut in config.segments)
+    )
+    parameters = stiff.parameters | {"yield_stress": jnp.full_like(stiff.mass, 1e6)}
+    choice = which_stepping(yields, replace(stiff, parameters=parameters), still, 1 / 24)
+    assert choice.stepping == "implicit" and choice.reason.endswith(LAG)
