@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.case import Case, Prepared
+from benchmarks.worker import commit
 
 MATERIALS = ("jelly", "elastic", "metal", "sand", "fracture")
 BEFORE = "JAXPHYS_BEFORE"
@@ -65,6 +66,8 @@ def prepare(
     from jaxphys.gaussians import gaussians_from_mesh
     from jaxphys.gaussians.ply import write_ply
 
+    if not (Path(checkout) / "jaxphys").is_dir():  # what is installed would run instead
+        raise FileNotFoundError(f"{BEFORE}: {checkout} has no folder jaxphys; name a checkout")
     folder = tempfile.TemporaryDirectory()
     thing, out = Path(folder.name) / "strawberry.ply", Path(folder.name) / "run"
     write_ply(thing, gaussians_from_mesh(fruit(), splats, 0))
@@ -87,6 +90,7 @@ def prepare(
         return {
             "stages": timing["stages"],
             "compile": timing["compile"],
+            "commit": commit(checkout),
             "cpu_seconds": used.ru_utime + used.ru_stime,
             "peak_bytes": used.ru_maxrss * 1024,
         }
@@ -100,7 +104,7 @@ def cases(quick: bool) -> list[Case]:
     size = dict(zip(("frames", "width", "height", "splats"), numbers, strict=True))
     checkouts = {"jaxphys": str(Path(__file__).parents[1])}
     if BEFORE in os.environ:
-        checkouts["before"] = os.environ[BEFORE]
+        checkouts["before"] = str(Path(os.environ[BEFORE]).resolve())
     return [
         Case(
             material,

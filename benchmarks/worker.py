@@ -47,11 +47,13 @@ def machine() -> dict[str, object]:
     return {"processor": names[0] if names else platform.processor(), "cores": os.cpu_count()}
 
 
-def commit() -> str | None:
-    """What is measured: the commit, with a plus where files differ from it; None: unknown."""
+def commit(checkout: str = ".") -> str | None:
+    """What is measured: a checkout's commit, with a plus where files differ from it; None: unknown."""
 
     def git(*words: str) -> str:
-        return subprocess.run(["git", *words], capture_output=True, text=True, check=True).stdout
+        return subprocess.run(
+            ["git", "-C", checkout, *words], capture_output=True, text=True, check=True
+        ).stdout
 
     try:
         changed = git("status", "--porcelain", "--untracked-files=no").strip()
