@@ -48,7 +48,7 @@ def machine() -> dict[str, object]:
 
 
 def commit(checkout: str = ".") -> str | None:
-    """What is measured: a checkout's commit, with a plus where files differ from it; None: unknown."""
+    """A checkout's commit, with a plus where files differ from it; None: unknown."""
 
     def git(*words: str) -> str:
         return subprocess.run(
