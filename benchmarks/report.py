@@ -15,6 +15,7 @@ from pathlib import Path
 from benchmarks.leave_out import cases as leave_out_cases
 from benchmarks.report_figures import draw_profile, draw_sheet
 from benchmarks.report_leave_out import leave_out_page
+from benchmarks.report_peers import peers_section
 from benchmarks.report_tolerance import tolerance_page
 
 SUITE = "work-precision"
@@ -195,6 +196,10 @@ Taichi is this very step; Genesis and Newton are what they are ([peers](peers.md
 
 {variants}
 
+## Against peers
+
+{peers}
+
 ## Which is best how often
 
 The share of grids on which a method needs at most so many times the time of the fastest one that is
@@ -248,6 +253,7 @@ def write_report(lines_folder: Path, out: Path) -> None:
             machines=machines(lines),
             orders=orders_table(rollouts),
             variants="\n\n".join(sections),
+            peers=peers_section(rollouts, _name, _error_text, _seconds_text),
             splats="A ball of 2,000 splats at 240 x 136",
             picture=single_table(problems.get("picture", {}), "picture"),
             gradient=single_table(problems.get("gradient", {}), "gradient"),

@@ -42,6 +42,8 @@ def view(
     from jaxphys.core.errors import InputError
     from jaxphys.viewer.serve import view_run, view_scene
 
+    if not source.exists():
+        raise InputError(f"{source}: no such file or folder")
     if not 0 <= port < 65536:
         raise InputError(f"--port: {port} must be between 0 and 65535")
     if nodes < 4096:

@@ -89,7 +89,7 @@ class FitConfig:
     """What `jaxphys fit` is asked for.
 
     Attributes:
-        scene: a scene's file, beside this one.
+        scene: a scene's file, beside this one; or the folder of a run.
         free: name -> what it may be.
         observed: what was seen.
         search: None: what suits.

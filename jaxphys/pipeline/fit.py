@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from tqdm import tqdm
 from jaxphys.core.checkpoints import Checkpoints, fingerprint
 from jaxphys.core.files import aside_path, atomic_path
 from jaxphys.core.interrupt import deferred_interrupt
+from jaxphys.core.reading import reading
 from jaxphys.core.run_folder import run_folder
 from jaxphys.fitting.config import read_config
 from jaxphys.fitting.evaluation import Memory
@@ -29,8 +31,10 @@ from jaxphys.pipeline.video import VideoWriter
 from jaxphys.render.camera import Camera, position
 from jaxphys.render.renderer import render
 from jaxphys.scene.build import build, validate
+from jaxphys.scene.model_folder import splats_in
 from jaxphys.scene.obstacles import located, mesh_file, mesh_obstacles
 from jaxphys.scene.read import read_scene
+from jaxphys.scene.scene import Scene
 from jaxphys.scene.source import load_object
 from jaxphys.scene.view import View
 
@@ -67,9 +71,8 @@ def fit_file(
     """
     path = Path(path)
     config = read_config(path)
-    scene = read_scene(path.parent / config.scene).scene
-    validate(scene)
-    beside = (path.parent / config.scene).parent
+    scene, of_scene = scene_named(path.parent / config.scene)
+    beside = of_scene.parent
     scene = located(scene, beside)
     objects = [
         load_object(thing, beside, scene.seed + i, f"objects[{i}]")
@@ -78,7 +81,7 @@ def fit_file(
     simulation, look = build(scene, *objects)
     observed = [one.read(path.parent) for one in config.observed]
     layout(config.free, simulation, look)  # a wrong name is told before anything is made
-    inputs = [path, path.parent / config.scene, *source_files(scene.objects, beside)]
+    inputs = [path, of_scene, *source_files(scene.objects, beside)]
     inputs += [mesh_file(scene, i) for i in mesh_obstacles(scene)]
     inputs += [one.path(path.parent) for one in config.observed]
     files = tuple(source.read_bytes() for source in inputs)
@@ -129,6 +132,24 @@ def fit_file(
             aside.unlink(missing_ok=True)
         folder.remove(EVALUATIONS)
     return found
+
+
+def scene_named(path: Path) -> tuple[Scene, Path]:
+    """The scene of a file, or of the folder of a run, whose own splats its first object is made of
+    where it names nothing; and the file that was read.
+
+    Raises:
+        InputError: there is none, or it cannot be used.
+    """
+    file = path / "config.json" if path.is_dir() else path
+    scene = read_scene(file).scene
+    with reading(file):
+        validate(scene)
+    first = scene.objects[0]
+    if path.is_dir() and first.source is None:
+        first = replace(first, source=str(splats_in(path).absolute()))
+        scene = replace(scene, objects=(first, *scene.objects[1:]))
+    return scene, file
 
 
 def curves_of(found: Fit) -> str:

@@ -4,7 +4,7 @@ Five steps, each a function: objects are put in their places, become particles, 
 model and a state, these get a time step, and the Gaussians become a look.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -76,9 +76,11 @@ def validate(scene: Scene) -> None:
         InputError: naming the field.
     """
     try:
-        scene = scene_from_json(to_json(scene))
+        read = scene_from_json(to_json(scene))
     except InputError as error:
         raise InputError(str(error).removeprefix("scene.")) from None
+    _refuse_other_kinds(scene, read, "scene")
+    scene = read
     for i, thing in enumerate(scene.objects):
         where = f"objects[{i}]"
         try:
@@ -104,6 +106,19 @@ def validate(scene: Scene) -> None:
                 material_values(material, parameters)
             except InputError as error:
                 raise InputError(f"{label}: {error}") from None
+
+
+def _refuse_other_kinds(given: Any, read: Any, where: str) -> None:
+    """A dict reads as what it describes, and has none of its functions: refuses it by its name."""
+    if is_dataclass(read):
+        if type(given) is not type(read):
+            raise InputError(f"{where}: is {shown(given)}; give {type(read).__name__}(...)")
+        for part in fields(read):
+            name = part.name if where == "scene" else f"{where}.{part.name}"
+            _refuse_other_kinds(getattr(given, part.name), getattr(read, part.name), name)
+    elif isinstance(read, tuple):
+        for i, pair in enumerate(zip(given, read, strict=True)):
+            _refuse_other_kinds(*pair, f"{where}[{i}]")
 
 
 def material_of(thing: Object) -> Material:

@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.report import by_problem, error_of, observed_order, read_lines, write_report
 from benchmarks.report_figures import ratios
+from benchmarks.report_peers import compared, runs_until_ahead
 
 
 def line(problem, method, resolution, error, seconds, **more):
@@ -83,6 +84,35 @@ def test_a_profile_compares_with_the_fastest_that_is_as_accurate(tmp_path):
     assert found["jaxphys-float64"][3] == pytest.approx(6.0)
 
 
+def test_a_peer_is_met_by_the_fastest_default_that_is_as_accurate():
+    problem = {
+        "jaxphys-float64": [line("bar", "jaxphys-float64", n, 1 / n**2, 0.01 * n) for n in (8, 16)],
+        "jaxphys": [line("bar", "jaxphys", 8, 0.1, 0.001)],
+        "jaxphys-pic": [line("bar", "jaxphys-pic", 8, 1e-9, 1e-9)],  # is no default
+        "genesis": [line("bar", "genesis", 8, 1 / 64, 0.1), line("bar", "genesis", 64, 1e-4, 0.2)],
+        "newton": [line("bar", "newton", 8, 0.2, 0.5), line("bar", "newton", 16, None, 0.5)],
+    }
+    found = [
+        (one["method"], best and best["seconds"]) for _, one, best in compared({"bar": problem})
+    ]
+    assert found == [("genesis", 0.08), ("genesis", None), ("newton", 0.001)]
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "runs"),
+    [
+        ((1.0, 0.1), (2.0, 0.2), 1),
+        ((5.0, 0.1), (0.0, 1.1), 5),  # 5 + 5 * 0.1 = 5.5 = 5 * 1.1
+        ((5.1, 0.1), (0.0, 1.1), 6),
+        ((5.0, 0.2), (0.0, 0.1), math.inf),
+        ((5.0, 0.2), (None, 0.3), None),
+    ],
+)
+def test_compiling_pays_from_some_run_on(ours, theirs, runs):
+    one, other = (dict(zip(("compile_seconds", "seconds"), x, strict=True)) for x in (ours, theirs))
+    assert runs_until_ahead(one, other) == runs
+
+
 def test_the_report_is_made_of_lines_alone_and_is_the_same_again(tmp_path):
     pytest.importorskip("matplotlib")
     folder = tmp_path / "lines"
@@ -95,6 +125,7 @@ def test_the_report_is_made_of_lines_alone_and_is_the_same_again(tmp_path):
     assert "a processor, 2 cores, jax 0.0, commit abc" in page
     assert "| bar | 8, 16, 32 | 1.6e-02, 3.9e-03, 9.8e-04 | exact | 2 | 2.00 |" in page
     assert "out of memory" in page and "failed" in page
+    assert "On 1 of the 1 problems that a peer can state" in page
     assert "| genesis | 1.0e-02, 0.2 s |" in page and "newton left out" not in page
     before = {one.name: one.read_bytes() for one in out.iterdir()}
     assert set(before) == {"README.md", "error-time.svg", "variants.svg", "profile.svg"}

@@ -7,6 +7,7 @@ import pytest
 
 import jaxphys.pipeline.fit as fit_module
 from jaxphys.cli.main import run
+from jaxphys.core.errors import InputError
 from jaxphys.gaussians.gaussians import from_points
 from jaxphys.gaussians.ply import write_ply
 from jaxphys.pipeline.fit import fit_file
@@ -18,11 +19,16 @@ MODULUS, SPEED = 3e3, 0.4
 LATTICE = np.stack(np.meshgrid(*3 * [np.linspace(-1, 1, 5)], indexing="ij"), -1).reshape(-1, 3)
 
 
+def block(grey):
+    """A lattice of Gaussians."""
+    return from_points(LATTICE.astype(np.float32), np.full((125, 3), grey), 0.3)
+
+
 @pytest.fixture(scope="module")
 def asked(tmp_path_factory):
     """A folder with a block that is thrown at a floor, and its tracks; the fit starts elsewhere."""
     folder = tmp_path_factory.mktemp("fit")
-    gaussians = from_points(LATTICE.astype(np.float32), np.full((125, 3), 0.5), 0.3)
+    gaussians = block(0.5)
     write_ply(folder / "block.ply", gaussians)
     thing = {
         "source": "block.ply",
@@ -117,6 +123,28 @@ def test_an_obstacles_mesh_lies_beside_the_scene_and_decides_the_request(
         with pytest.raises(KeyboardInterrupt):
             fit_file(asked / "pegged_fit.json", tmp_path / f"out{height}")
         marks.append((tmp_path / f"out{height}/.jaxphys-run").read_text())
+    assert marks[0] != marks[1]
+
+
+def test_a_runs_folder_is_a_scene(asked, tmp_path, monkeypatch):
+    """With the splats that lie in it; they decide the request, as a file's do."""
+    run_folder = tmp_path / "run"
+    run_folder.mkdir()
+    scene = json.loads((asked / "scene.json").read_text())
+    del scene["objects"][0]["source"]
+    (run_folder / "config.json").write_text(json.dumps(scene))
+    config = json.loads((asked / "fit.json").read_text()) | {"scene": "run"}
+    config["observed"][0]["file"] = str(asked / "tracks.npz")
+    (tmp_path / "fit.json").write_text(json.dumps(config))
+    monkeypatch.setattr(fit_module, "fit", stopped)
+    with pytest.raises(InputError, match=r"run: holds neither gaussians\.ply"):
+        fit_file(tmp_path / "fit.json", tmp_path / "none")
+    marks = []
+    for grey in (0.5, 0.6):
+        write_ply(run_folder / "gaussians.ply", block(grey))
+        with pytest.raises(KeyboardInterrupt):
+            fit_file(tmp_path / "fit.json", tmp_path / f"out{grey}")
+        marks.append((tmp_path / f"out{grey}/.jaxphys-run").read_text())
     assert marks[0] != marks[1]
 
 

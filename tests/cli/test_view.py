@@ -21,6 +21,11 @@ def test_without_viser_it_says_what_to_install(capsys, monkeypatch):
     assert "jaxphys-splats[viewer]" in refused(capsys, BALL)
 
 
+def test_what_is_not_there_is_told_before_what_is_not_installed(capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "viser", None)
+    assert "nope.ply: no such file" in refused(capsys, "nope.ply")
+
+
 @pytest.mark.parametrize(
     ("option", "value"), [("--port", "70000"), ("--nodes", "100"), ("--splats", "0")]
 )

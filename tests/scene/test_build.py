@@ -132,6 +132,19 @@ def test_texts_and_truths_are_no_numbers():
         Domain(size=(1.0, 1.0))
 
 
+@pytest.mark.parametrize(
+    "changes, told",
+    [
+        ({"domain": {"size": [2.0, 2.0, 2.0], "spacing": 0.25}}, r"^domain: .*give Domain\("),
+        ({"objects": ({"material": "jelly"},)}, r"^objects\[0\]: .*give Object\("),
+        ({"boundaries": ({"type": "walls"},)}, r"^boundaries\[0\]: .*give Walls\("),
+    ],
+)
+def test_a_dict_that_reads_well_is_still_no_dataclass(changes, told):
+    with pytest.raises(InputError, match=told):
+        build(replace(scene(), **changes), GAUSSIANS)
+
+
 def test_a_path_is_no_set_of_gaussians():
     with pytest.raises(InputError, match=r"^build: objects\[0\] is 'a.ply'; .*jaxphys.load"):
         build(scene(), "a.ply")

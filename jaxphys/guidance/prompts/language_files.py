@@ -10,6 +10,7 @@ from tokenizers import Tokenizer
 
 from jaxphys.core.errors import InputError
 from jaxphys.core.files import read_json
+from jaxphys.core.reading import reading
 from jaxphys.networks.llama_config import LlamaConfig
 from jaxphys.weights.gguf_file import read_gguf
 from jaxphys.weights.gguf_tokenizer import tokenizer_from_gguf
@@ -85,12 +86,13 @@ def _from_folder(path: Path) -> LanguageFiles:
     values = read_json(path / "config.json")
     config = LlamaConfig.from_json(values, str(path / "config.json"))
     file = path / "tokenizer.json"
-    try:
-        tokenizer = Tokenizer.from_str(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read ({error.strerror})") from None
-    except Exception as error:  # the package raises nothing more special
-        raise InputError(f"{file}: is no tokenizer ({error}); get it again") from None
+    with reading(file):
+        try:
+            tokenizer = Tokenizer.from_buffer(file.read_bytes())
+        except OSError:
+            raise  # told by the border
+        except Exception as error:  # the package raises nothing more special
+            raise InputError(f"is no tokenizer ({error}); get it again") from None
     tokenizer.no_truncation()
     tokenizer.no_padding()
     template, written = None, path / "chat_template.jinja"
