@@ -19,9 +19,8 @@ counts 2.19 times for it is not exact either (`experiments/tolerance.py`):
     python -m experiments.tolerance --out benchmarks/lines/tolerance.jsonl
     python -m benchmarks report
 
-{ran} of the {drawn} scenes drawn have been run so far, {judged} of them to the end; the command
-goes on with the others. Taken on two cores (Intel Xeon, AVX-512) beside much other work, so that
-the seconds are those of a disturbed machine.
+{ran} of the {drawn} scenes drawn have been run, {judged} to the end ({machine}, nothing else
+running). Seconds are those of simulating, without the pilots.
 
 {table}
 
@@ -37,8 +36,6 @@ the seconds are those of a disturbed machine.
 * The scenes are not all unseen. The number of cells was chosen on a jelly ball (below). That orders
   below 1 are taken for 1 was decided after the pilots of that first scene had asked for 327,000
   particles.
-* Times of runs of a second or two are compilation of windows and what a frame costs at least; the
-  estimate counts neither well.
 * Only the spacing is chosen, and particles and steps with it. Transfer and dtype stay what they
   are; a tolerance below 1e-4 asks for float64.
 
@@ -67,5 +64,14 @@ def tolerance_page(path: Path) -> str:
         drawn=len(drawn()),
         judged=len(good),
         finer=sum(line["spacings"][-1] >= 1.2 * line["spacing"] for line in good),
+        machine="; ".join(
+            sorted(
+                {
+                    "{processor}, {cores} cores".format(**line["machine"])
+                    for line in lines
+                    if "machine" in line
+                }
+            )
+        ),
         table=table(lines),
     )

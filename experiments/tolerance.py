@@ -30,12 +30,12 @@ from jaxphys.gaussians.gaussians import Gaussians, from_points
 from jaxphys.pipeline.frames import frames
 from jaxphys.pipeline.pilots import with_spacing
 from jaxphys.pipeline.tolerance import TolerancePlan, plan_for
-from jaxphys.scene import Domain, Object, Plane, Scene
+from jaxphys.scene import Domain, Filling, Object, Plane, Scene
 from jaxphys.scene.build import build
 
 GROUPS, SCENES = 9, 3
 FINER, ASSUMED_ORDER = 1.5, 1.5
-LARGEST = 700_000  # particles of the finer run
+LARGEST = 400_000  # particles of the finer run
 SPLATS = 2_000
 SIZE, MIDDLE, FLOOR = 0.8, 0.8, 0.3
 
@@ -123,6 +123,7 @@ def scene_of(what: Drawn) -> Scene:
     thing = Object(
         material=what.material,
         parameters=what.parameters,
+        filling=Filling(maximum=LARGEST),
         size=SIZE,
         centre=(MIDDLE, MIDDLE, FLOOR + what.gap + rise),
         velocity=(0.0, 0.0, -what.speed),

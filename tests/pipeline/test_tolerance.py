@@ -2,7 +2,9 @@
 
 import dataclasses
 import json
+from itertools import islice
 
+import jax
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from jaxphys.core.errors import InputError
 from jaxphys.mpm.stepping import Implicit
 from jaxphys.pipeline import pilots, tolerance
 from jaxphys.pipeline.animate import animate
+from jaxphys.pipeline.frames import frames
 from jaxphys.pipeline.pace import pace, programs
 from jaxphys.pipeline.plan import ball, make_plan
 from jaxphys.scene import Domain, Object, Scene, read_scene
@@ -111,6 +114,16 @@ def test_the_pace_is_that_of_steps_and_a_window_that_moves_is_compiled_again():
     simulation = build(spinning(), ball(300)).simulation
     measured = pace(simulation, budget=0.05)
     assert measured.compile > 0 and measured.step > 0 and measured.steps >= simulation.steps // 2
+    compiled = []
+
+    def note(name, seconds, **more):
+        compiled.extend([name] * name.endswith("backend_compile_duration"))
+
+    jax.monitoring.register_event_duration_secs_listener(note)
+    list(islice(frames(simulation, particles=simulation.carriers), 2))
+    assert not compiled  # it was all there, or its seconds would be nobody's
+    list(islice(frames(simulation), 1))
+    assert compiled  # another look is another program: the listener hears
     here = np.array([[0.5, 0.5, 0.5], [1.1, 1.1, 1.1]])
     large = np.array([[0.2, 0.2, 0.2], [1.4, 1.4, 1.4]])
     still = programs(simulation, np.stack([here] * 4))
