@@ -55,7 +55,9 @@ def leave_out_page(path: Path, expected: list[str]) -> str:
         )
     first = next(line for line in measured.values() if "cells" in line)
     return PAGE.format(
-        processor=first["machine"]["processor"],
+        processor="; ".join(
+            dict.fromkeys(line["machine"]["processor"] for line in measured.values())
+        ),
         count=f"{8 * first['cells'] ** 3:,}",
         table="\n".join(rows),
         absent=f"\nNot measured yet: {', '.join(absent)}.\n" if absent else "",
