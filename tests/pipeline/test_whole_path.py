@@ -218,7 +218,9 @@ def test_numbers_of_boundaries_reach_the_motion_and_its_gradient(landing):
         motion = rollout_frames(landing.with_(boundaries=numbers), 3)
         return jnp.sum(motion.position[-1] ** 2)
 
-    gradient = jax.jit(jax.grad(loss))(numbers)
+    # At level 0, which the suite compiles with, this program alone gives NaN.
+    level = {"xla_backend_optimization_level": 1}
+    gradient = jax.jit(jax.grad(loss), compiler_options=level)(numbers)
     loss, step = jax.jit(loss), 1e-5
     for index, of in numbers.items():
         for name, value in of.items():

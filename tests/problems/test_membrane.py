@@ -32,8 +32,9 @@ def test_the_panel_has_its_area_and_its_load():
 
 @pytest.mark.parametrize(
     ("cells", "locked", "off"),
-    [(6, 0.65, 0.12), pytest.param(16, 0.87, 0.05, marks=pytest.mark.slow)],
+    [(6, 0.65, 0.12), (16, 0.87, 0.05)],
 )
+@pytest.mark.slow
 def test_tip(cells, locked, off):
     """Shares of the rise that F-bar elements have (de Souza Neto et al. 1996)."""
     plain, shared = (

@@ -117,6 +117,7 @@ def test_sand_runs_into_a_heap():
     assert speed < 0.2
 
 
+@pytest.mark.slow
 def test_what_fractures_breaks_into_pieces():
     """Pieces are what hangs together by unbroken matter: crumbs between them hold nothing."""
     end = ended("fracture", 18, SPACING)

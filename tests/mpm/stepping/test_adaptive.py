@@ -212,7 +212,9 @@ def test_the_gradient_is_that_of_the_realised_steps(loss, taken):
     assert float(to_velocity[1, 7]) == pytest.approx(difference, rel=1e-6)
 
 
-@pytest.mark.parametrize("adjoint", [Plain(), Checkpointed()], ids=repr)
+@pytest.mark.parametrize(
+    "adjoint", [Plain(), pytest.param(Checkpointed(), marks=pytest.mark.slow)], ids=repr
+)
 def test_the_gradient_of_frames_that_failed_is_not_a_number(loss, adjoint):
     run, velocity = loss
     # A thousand times as stiff, it flies apart within the room for steps that there is.
