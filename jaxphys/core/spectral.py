@@ -86,7 +86,7 @@ def eigen_symmetric(A: Array) -> tuple[Array, Array]:
     functions through `left_isotropic` instead, which is right there.
     """
     # The barriers keep XLA from fusing, and so repeating, all that comes before into each array
-    # that comes after.
+    # that comes after; its CPU backend drops them first, so that nothing may hang on them.
     limits = jnp.finfo(A.dtype)
     (a, f, e), (_, b, d), (_, _, c) = algebra.entries(A)
     mean = (a + b + c) / 3
