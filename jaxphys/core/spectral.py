@@ -21,10 +21,10 @@ from jaxphys.core import algebra
 from jaxphys.core.program import part
 
 PAIRS = ((0, 1), (0, 2), (1, 2))
-# Where a choice may fall either way it is made this far from the tie. Symmetric strains lie on ties,
-# up to rounding, and a compiler that forms a number anew for each of its uses may round it to one
-# side in one and to the other in the next: half of one choice with half of the other is an answer to
-# neither.
+# Where a choice may fall either way it is made this far from the tie. Symmetric strains lie on
+# ties, up to rounding, and a compiler that forms a number anew for each of its uses may round it to
+# one side in one and to the other in the next: half of one choice with half of the other is an
+# answer to neither.
 ASIDE = 0.0317
 
 
@@ -111,8 +111,8 @@ def eigen_symmetric(A: Array) -> tuple[Array, Array]:
     C12, C02, C01 = e * f - p * d, d * f - q * e, d * e - r * f
     C00, C11, C22, C12, C02, C01 = optimization_barrier((C00, C11, C22, C12, C02, C01))
     nearly = 1 - ASIDE
-    first = (C00 >= nearly * C11) & (C00 >= nearly * C22)
-    second = ~first & (C11 >= nearly * C22)
+    first = (nearly * C11 <= C00) & (nearly * C22 <= C00)
+    second = ~first & (nearly * C22 <= C11)
     v = [
         jnp.where(first, C00, jnp.where(second, C01, C02)),
         jnp.where(first, C01, jnp.where(second, C11, C12)),
