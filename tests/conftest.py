@@ -11,8 +11,8 @@ os.environ.setdefault(
 )
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.3")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
-# Four fifths of the suite are compilation, and these make it a quarter as long; what a user runs is
-# compiled with neither, and so are the slow tests (Makefile) and what follows the tests in .ci/run.
+# Most of the suite is compilation, and these make it a quarter as long in its heavy tests; what a
+# user runs is compiled with neither, and so are the slow tests (Makefile) and the rest of .ci/run.
 os.environ.setdefault(
     "XLA_FLAGS", "--xla_backend_optimization_level=0 --xla_cpu_use_fusion_emitters=false"
 )

@@ -113,6 +113,21 @@ def test_polar_rotation_of_strongly_stretched_matrices(scale, random):
     np.testing.assert_allclose(spectral.polar_rotation(F), exact_polar(F), atol=1e-11)
 
 
+@pytest.mark.parametrize("shear", [0.3, -0.3])
+@pytest.mark.parametrize("plane", [(0, 1), (0, 2), (1, 2)])
+def test_symmetric_strains_lie_aside_of_every_choice(plane, shear, random):
+    """Rounding, of whichever sign, does not exchange or turn the eigenvectors of a pure shear."""
+    A = np.zeros((3, 3))
+    A[plane] = A[plane[::-1]] = shear
+    noise = random.normal(size=(3, 3, 50))
+    noise = 1e-9 * (noise + noise.swapaxes(0, 1))
+    decompose = jax.jit(spectral.eigen_symmetric)
+    for one, other in zip(
+        decompose(A[..., None] + noise), decompose(A[..., None] - noise), strict=True
+    ):
+        np.testing.assert_allclose(one, other, atol=1e-7)
+
+
 def hencky(e, arguments):
     weight, bulk = arguments
     total = e[0] + e[1] + e[2]
